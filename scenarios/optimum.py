@@ -7,88 +7,126 @@ per trip. Every vehicle counts, so runs go on until the last one has arrived.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
+from baselines.optimum.planning import drivable
+from baselines.optimum.scheduled import BUFFER, Scheduled, Turn
 from baselines.optimum.separations import Needs, necessary
-from baselines.optimum.sequencing import WAKE_STEP, Queue, Schedule, scheduled
+from baselines.optimum.sequencing import WAKE_STEP, Queue, scheduled
 from baselines.prediction import Floats
-from minisim.arrivals import Arrivals
-from minisim.control import Cover, Site
+from minisim.arrivals import Arrivals, ranks
+from minisim.control import Controller, Cover, Site
 from minisim.engine.state import types_of
 from minisim.errors import InputError
 from minisim.junction.movements import Ints
-from minisim.results.run import Run
+from minisim.results.run import Run, ScenarioLike
+from minisim.simulation import simulate
 from scenarios.scenario import Scenario
 
-#: The vehicles for which the bound holds: their speeds never exceed the limits.
+#: The vehicles for which the bound holds: no speed exceeds the limits, and drivers are alike.
 COVERS = Cover(alike=True)
+
+#: A run goes on for so many times its horizon at most, until the last vehicle has arrived.
+PATIENCE = 3.0
 
 
 @dataclass(frozen=True)
 class Drained:
-    """A scenario whose runs go on until the last vehicle has arrived, `extra` [s] at most."""
+    """A scenario whose runs go on until the last vehicle has arrived."""
 
     scenario: Scenario
-    extra: float = 3600.0
+    name: str = field(init=False)
+    profile_name: str = field(init=False)
+    density: float = field(init=False)
+    depart_speed: float | None = field(init=False)
+    horizon: float = field(init=False)
+    warmup: float = 0.0
 
-    name = property(lambda self: self.scenario.name)
-    profile_name = property(lambda self: self.scenario.profile_name)
-    density = property(lambda self: self.scenario.density)
-    depart_speed = property(lambda self: self.scenario.depart_speed)
-    warmup = 0.0
-
-    @property
-    def horizon(self) -> float:
-        return self.scenario.horizon + self.extra
+    def __post_init__(self) -> None:
+        for name in ("name", "profile_name", "density", "depart_speed"):
+            object.__setattr__(self, name, getattr(self.scenario, name))
+        object.__setattr__(self, "horizon", self.scenario.horizon * PATIENCE + 600.0)
 
     def site(self, seed: int) -> Site:
+        """What a controller may know, the expected inflow of the demand included."""
         return self.scenario.site(seed)
 
     def arrivals(self, seed: int) -> Arrivals:
+        """Those of the scenario."""
         return self.scenario.arrivals(seed)
 
 
-class Demanded(NamedTuple):
-    """The vehicles of a run in demand order, shape (k,) each."""
+class Optimum(NamedTuple):
+    """The least delay of an arrival table, and a schedule; means over all vehicles."""
 
-    time: Floats  #: when each wants to enter the road [s]
-    lane: Ints
-    kind: Ints  #: index of its movement, those of each type in turn
+    vehicles: int
+    bound: float  #: no controller has less [s]
+    planned: float  #: of the schedule [s]
+    schedule: Scheduled  #: a controller that keeps it
+    at_limit: float  #: what the ways take at the limits, from demand time 0 [s]
+
+    def delay(self, run: Run) -> float:
+        """The mean delay of a run [s]; infinite if a vehicle has not arrived."""
+        arrival = run.columns.arrival
+        return float(arrival.mean()) - self.at_limit if len(arrival) else 0.0
 
 
-def demanded(scenario: Scenario, seed: int) -> Demanded:
+def optimum(scenario: Scenario, seed: int = 0) -> Optimum:
+    """The bound and a schedule for the arrivals of a seed; raises `InputError` for `COVERS`."""
     site, arrivals = scenario.site(seed), scenario.arrivals(seed)
-    movements = site.intersection.movements
-    movement = movements.index_of[arrivals.lane, arrivals.manoeuvre]
-    kind = types_of(site, arrivals) * len(movements) + movement
-    return Demanded(arrivals.time, arrivals.lane, kind)
-
-
-def queue_of(vehicles: Demanded, site: Site, needs: Needs) -> tuple[Queue, Ints]:
-    """The queue of vehicles, and the index of each in demand order."""
-    order = np.lexsort((vehicles.time, vehicles.lane))
-    enters = np.ceil(vehicles.time / site.dt - 1e-6)[order] * site.dt
-    lane, kind = vehicles.lane[order], vehicles.kind[order]
-    behind = np.diff(enters, prepend=-np.inf)
-    behind[np.diff(lane, prepend=-1) > 0] = np.inf
-    place = np.minimum(behind / WAKE_STEP, needs.approach.shape[1] - 1.0)
-    loss = needs.approach[kind, np.ceil(place).astype(int)]
-    loss[~np.isfinite(behind)] = 0.0
-    begins = np.searchsorted(lane, np.arange(site.intersection.n + 1))
-    return Queue(enters + loss + needs.until[kind], kind, begins), order
-
-
-def bound(scenario: Scenario, seed: int) -> tuple[float, Schedule]:
-    site, vehicles = scenario.site(seed), demanded(scenario, seed)
+    _check(site, arrivals)
+    movement = site.intersection.movements.index_of[arrivals.lane, arrivals.manoeuvre]
+    kind = types_of(site, arrivals) * len(site.intersection.movements) + movement
+    count, order = len(kind), np.lexsort((arrivals.time, arrivals.lane))
+    enters = np.ceil(arrivals.time / site.dt - 1e-6) * site.dt
     needs = necessary(site, scenario.depart_speed)
-    queue, _ = queue_of(vehicles, site, needs)
-    made = scheduled(queue, needs.rules)
-    return made.bound - float((vehicles.time + needs.at_limit[vehicles.kind]).sum()), made
+    plan = drivable(site, BUFFER, scenario.depart_speed)
+    least = scheduled(_queue(enters[order], arrivals.lane[order], kind[order], needs), needs.rules)
+    best = scheduled(_queue(enters[order], arrivals.lane[order], kind[order], plan), plan.rules)
+    rank = ranks(arrivals.lane)[order]
+    turns = tuple(
+        Turn(int(arrivals.lane[order[i]]), int(rank[i]), int(kind[order[i]]), float(best.time[i]))
+        for i in best.order.tolist()
+    )
+    at_limit = float((arrivals.time + needs.at_limit[kind]).sum())
+    mean = 1.0 / max(count, 1)
+    return Optimum(
+        count, (least.bound - at_limit) * mean, (float(best.arrival.sum()) - at_limit) * mean,
+        Scheduled(turns), at_limit * mean,
+    )  # fmt: skip
 
 
-def delay(run: Run, vehicles: Demanded, at_limit: Floats) -> float:
-    late = run.columns.arrival - vehicles.time - at_limit[vehicles.kind]
-    return float(late.sum())
+def driven(
+    scenario: Scenario, controller: Controller, seed: int = 0,
+    host: Callable[..., Run] = simulate,
+) -> Run:  # fmt: skip
+    """Run a scenario until the last vehicle has arrived; a collision raises `CollisionError`."""
+    return host(Drained(scenario), controller, seed)
+
+
+def _check(site: Site, arrivals: Arrivals) -> None:
+    for it in site.types:
+        COVERS.check("the optimum", it)
+        if it.sumo is not None:
+            raise InputError(
+                f"the optimum is for vehicles with minisim's own rules, got sumo={it.sumo!r}"
+            )
+    factors = arrivals.speed_factor
+    if factors is not None and (factors != 1.0).any():
+        raise InputError("the optimum is for drivers that are alike, got speed factors")
+
+
+def _queue(enters: Floats, lane: Ints, kind: Ints, needs: Needs) -> Queue:
+    """The vehicles, by lane; none comes before it would behind the one ahead of it, if alone."""
+    behind = np.diff(enters, prepend=-math.inf)
+    behind[np.diff(lane, prepend=-1) > 0] = math.inf
+    # A larger time behind only makes the loss smaller.
+    place = np.minimum(np.ceil(behind / WAKE_STEP), needs.approach.shape[1] - 1.0).astype(int)
+    loss = np.where(behind < math.inf, needs.approach[kind, place], 0.0)
+    begins = np.searchsorted(lane, np.arange(lane.max(initial=-1) + 2))
+    return Queue(enters + loss + needs.until[kind], kind, begins)

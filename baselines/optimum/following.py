@@ -14,8 +14,8 @@ per metre driven at least, which the test shows too.
 leaves this place then and drives at u. Behind the leader the law asks for no more than behind that
 point, from which the distance z only grows. So v as a function of z is below the solution of
 dv/dz = v̇(z, v, u)/(u − v) (two solutions of an equation of first order do not cross), and z and the
-time lost are above. This holds for any braking of both. What a vehicle loses by waiting first,
-so that it follows further behind, is added.
+time lost are above. This holds for any braking of both. The point counts until it leaves the road,
+which the leader does no earlier. A vehicle may also wait first, and follow further behind.
 """
 
 from __future__ import annotations
@@ -64,22 +64,22 @@ class Gaps(NamedTuple):
 
 @lru_cache(maxsize=1024)
 def least_losses(
-    me: Traits, limit: float, dt: float, length: float, far: float, start: float, alone: float,
-    behind: tuple[float, float],
+    me: Traits, limit: float, dt: float, length: float, far: float, gone: float, start: float,
+    alone: float, step: float, count: int,
 ) -> Floats:  # fmt: skip
-    """What a vehicle loses on a stretch of `far` metres at least, shape (times,) [s].
+    """What a vehicle loses on a stretch of `far` metres at least, shape (count,) [s].
 
     Against `alone` [s], if it begins at the speed `start` at most, behind a vehicle that began at
-    each of the times 0, step, … before it; `behind` is their step and number. At the beginning the
-    gap is the way of the point but for `length` [m]. The law sees a state that is up to a step old,
-    so the point counts as a step further ahead.
+    each of the times 0, step, … before it, and is on its road for at least `gone` metres. At the
+    beginning the gap is the way of the point but for `length` [m]. The law sees a state that is up
+    to a step old, so the point counts as a step further ahead.
     """
-    step, count = behind
-    times = step * np.arange(int(count))
+    times = step * np.arange(count)
     ahead, v, done = limit * times - length, np.full(len(times), start), np.zeros(len(times))
     s, took = np.zeros(len(times)), 0.0
     while took < far / limit + LONGEST and (s < far).any():
-        acc = _accelerations(me, v, ahead + limit * dt, np.array(limit), limit, dt)
+        gap = np.where(limit * (times + took) < gone, ahead + limit * dt, math.inf)
+        acc = _accelerations(me, v, gap, np.array(limit), limit, dt)
         after = np.minimum(v + acc * dt, limit)
         way = (v + after) / 2.0 * dt
         part = np.clip((far - s) / np.maximum(way, 1e-9), 0.0, 1.0)

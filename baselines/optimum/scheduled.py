@@ -1,212 +1,223 @@
 """A controller that lets vehicles pass in a given order, as near to its times as their law allows.
 
-It knows the order of all vehicles of a run beforehand, so it is no rival: it shows how near to the
+It knows the order of all vehicles of a run beforehand, so it is no rival. It shows how near to the
 bound vehicles can be driven. A vehicle gets the right of way when all that are before it in the
-order and conflict with it have theirs, and its passage, predicted by its law, fits theirs
-(`baselines.reservation`). Until then it is told to drive as slowly as makes it come in time, so that
-it crosses at full speed.
+order and conflict with it have theirs, and its passage, predicted by its law, fits theirs. Until
+then it drives as slowly as makes it come in time, so that it crosses at full speed.
 
-Passages fit if the bodies keep a clearance at any two moments up to `buffer` apart, and vehicles
-enter a shared exit lane in their order.
+It keeps the protocol of `baselines.reservation`, with two differences. Passages fit if the bodies
+keep a clearance (`minisim.junction.coordination`) at any two moments up to `buffer` apart. And
+vehicles enter a shared exit lane in the order of the schedule.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
-from typing import NamedTuple
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from baselines.optimum.alone import Drive, drives
-from baselines.optimum.separations import Separations
-from baselines.prediction import Floats
+from baselines.optimum.alone import drives
+from baselines.optimum.planning import drivable
+from baselines.prediction import predict
 from baselines.reservation import Manager, Reservation, ReservationSession, Slot
-from minisim.control import Advise, Command, Cover, Go, Observed, Plan, Site, View, Wake
-from minisim.junction.coordination import region
-from minisim.junction.movements import Ints
+from minisim.control import Advise, Command, Cover, Go, Observed, Plan, Site, View
+from minisim.junction.coordination import Region, region
 from minisim.names import Name
+from minisim.parameters import checked, declared, real
 
-#: Moments at which bodies are compared [s].
+#: Time that bodies keep apart by default: less than half of that at the edges of the tiles of the
+#: AIM4 simulator, 0.25 s on either side, which `baselines.reservation` keeps [s].
+BUFFER = 0.2
+
+#: Bodies are compared at moments so far apart [s].
 MOMENT = 0.025
 
+#: Slowest advice [m/s], and how fast a vehicle accelerates on its way to the junction, as a share
+#: of what it can: the law accelerates less the nearer it is to the limit.
+SLOWEST, SHARE = 2.0, 0.6
 
-class Bodies(Manager):
-    """Reservations that fit if bodies keep apart, in the order of a schedule."""
-
-    def __init__(self, site: Site, buffer: float) -> None:
-        super().__init__(site, buffer)
-        self.place: dict[int, int] = {}  #: of each vehicle in the order
-        self._site = site
-        self._shifts = (0.0, buffer, -buffer) if buffer else (0.0,)
-        junction, types = site.intersection, site.types
-        self._kind = {it: k for k, it in enumerate(self._types)}
-        self._regions = {
-            (p, one, q, other): region(junction, types[one], p, q, types[other])
-            for p, q in np.argwhere(site.conflicts).tolist()
-            for one in range(len(types)) for other in range(len(types))
-        }
-
-    def fits(self, slot: Slot, *, last: bool) -> bool:
-        if slot.hard:
-            return False
-        way = self._ways[slot.movement]
-        for other in self.slots.values():
-            if other.vehicle == slot.vehicle:
-                continue
-            key = slot.movement, self._kind[slot.type], other.movement, self._kind[other.type]
-            near = self._regions.get(key)
-            if near is None:
-                continue
-            first = self.place[other.vehicle] < self.place[slot.vehicle]
-            merges = self._ways[other.movement].exit_arm == way.exit_arm
-            if merges and (other.enters < slot.enters) != first:
-                return False
-            if self._touch(slot, other, near):
-                return False
-        return True
-
-    def _touch(self, slot: Slot, other: Slot, near) -> bool:
-        dt = self._site.dt
-        begin = max(slot.start, other.start, min(slot.enters, other.enters) - 10)
-        rows, columns = near.close.shape
-        ends = [it.start + int(it.s.searchsorted(0.25 * n)) for it, n in ((slot, rows), (other, columns))]
-        end = min(max(ends), slot.ends, other.ends)
-        if end <= begin: return False
-        t = np.arange(begin, end, MOMENT / dt)
-        mine = np.interp(t, np.arange(slot.start, slot.ends + 1), slot.s)
-        for shift in self._shifts:
-            its = np.interp(t + shift / dt, np.arange(other.start, other.ends + 1), other.s)
-            if near.touches(mine, its):
-                return True
-        return False
+#: A vehicle that is so much early is not considered yet [s]; one whose passage does not fit yet
+#: counts as so much later.
+EARLY, AGAIN = 1.0, 0.3
 
 
+class Turn(NamedTuple):
+    """A vehicle in the schedule."""
+
+    lane: int
+    rank: int  #: its place in its lane
+    kind: int  #: index of its movement, those of each type in turn
+    time: float  #: when it passes its mark [s]
+
+
+def _turns(_: str, value: Any) -> tuple[Turn, ...]:
+    return tuple(Turn(*it) for it in value)
+
+
+@declared
 class Scheduled:
+    """Vehicles pass in the order of a schedule that is known beforehand."""
+
     name = Name("scheduled")
     covers = Cover(alike=True)
 
-    def __init__(self, order, times, separations: Separations, buffer: float = 0.2, period: float = 0.5, depart_speed=None):
-        self.order = order  # (lane, rank) pairs
-        self.times = times
-        self.separations = separations
-        self.buffer, self.period, self.depart_speed = buffer, period, depart_speed
+    turns: tuple[Turn, ...] = checked("the schedule, first vehicle first", _turns, "Turns")
+    buffer: float = real("time that bodies keep apart", "s", low=0, high=10, default=BUFFER)
+    period: float = real("time between two looks", "s", low=0.01, high=10, default=0.5)
 
-    def start(self, site: Site):
-        self.covers.check(self.name, site.vehicle)
+    def start(self, site: Site) -> ScheduledSession:
+        """Begin a run; raises `InputError` for vehicles whose motion cannot be predicted."""
+        self.covers.check("scheduled", site.vehicle)
         return ScheduledSession(self, site)
 
 
+class Bodies(Manager):
+    """Reservations that fit if bodies keep apart, in the order of the schedule."""
+
+    def __init__(self, site: Site, buffer: float) -> None:
+        super().__init__(site, buffer)
+        self.place: dict[int, int] = {}  #: of each vehicle in the schedule, by id
+        self._dt, self._shifts = site.dt, (0.0, buffer / site.dt, -buffer / site.dt)
+        self._junction, self._kinds = site.intersection, site.types
+        self._number = {it: k for k, it in enumerate(self._types)}
+        self._conflicts = site.conflicts
+
+    def fits(self, slot: Slot, *, last: bool) -> bool:  # noqa: ARG002  (Manager's argument)
+        """Whether a passage fits every other."""
+        return not slot.hard and all(
+            self._apart(slot, other)
+            for other in self.slots.values()
+            if other.vehicle != slot.vehicle and self._conflicts[slot.movement, other.movement]
+        )
+
+    def _apart(self, slot: Slot, other: Slot) -> bool:
+        """Whether two vehicles pass each other in their order."""
+        first = self.place[other.vehicle] < self.place[slot.vehicle]
+        exits = self._ways[slot.movement].exit_arm, self._ways[other.movement].exit_arm
+        if exits[0] == exits[1] and (other.enters < slot.enters) != first:
+            return False
+        kinds = (self._kinds[self._number[it.type]] for it in (slot, other))
+        near = region(self._junction, next(kinds), slot.movement, other.movement, next(kinds))
+        return near is None or not self._touch(slot, other, near)
+
+    def _touch(self, slot: Slot, other: Slot, near: Region) -> bool:
+        """Whether the bodies come close at any two moments up to the buffer apart."""
+        begin = max(slot.start, other.start)
+        moments = np.arange(begin, min(slot.ends, other.ends), MOMENT / self._dt)
+        mine = np.interp(moments, np.arange(slot.start, slot.ends + 1), slot.s)
+        moments = moments[(mine > 0.0) & (mine < len(near.close))]  # the grid has steps < 1 m
+        mine = np.interp(moments, np.arange(slot.start, slot.ends + 1), slot.s)
+        its = np.arange(other.start, other.ends + 1)
+        return any(
+            near.touches(mine, np.interp(moments + shift, its, other.s)) for shift in self._shifts
+        )
+
+
 class ScheduledSession(ReservationSession):
+    """One run: grants passages in the order of the schedule, and slows the others down in time."""
+
+    manager: Bodies
+
     def __init__(self, controller: Scheduled, site: Site) -> None:
         super().__init__(Reservation(period=controller.period), site)
         self.manager = Bodies(site, controller.buffer)
         length = site.intersection.approach_length
-        self.plan = Plan(sight=length)
-        self._order = controller.order
-        self._times = controller.times
-        self._places = {it: k for k, it in enumerate(controller.order)}
-        self._site = site
-        self._sep = controller.separations
-        self._ways = drives(site, controller.depart_speed)
-        m = len(site.intersection.movements)
-        self._m = m
-        self._marks = [float(np.interp(u - w.before, w.time, w.s)) for u, w in zip(self._sep.until, self._ways)]
-        c = site.conflicts | ~site.intersection.movements.apart
-        t = len(site.types)
-        self._conflict = np.tile(c, (t, t))
-        self._passed = np.zeros(len(controller.order), bool)
-        self._first = 0
-        self._kinds = controller.kinds
+        self.plan = Plan(marks=(length,), sight=length)
+        self._turns = controller.turns
+        self._place = {(it.lane, it.rank): k for k, it in enumerate(controller.turns)}
+        self._first = 0  # place of the first in the schedule that has not passed
+        self._newest: dict[int, int] = {}  # highest rank seen by lane
+        self._seen: Mapping[tuple[int, int], Observed] = {}
+        self._advice: list[Command] = []
+        needs, ways = drivable(site, controller.buffer), drives(site)
+        self._between, self._drives = needs.rules.between, ways
+        at_mark = needs.until - [way.before for way in ways]
+        self._past = at_mark.tolist()  # least time from the entry to the mark [s]
+        self._marks = [float(np.interp(t, way.time, way.s)) for t, way in zip(at_mark, ways)]
+        movements, types = site.intersection.movements, len(site.types)
+        self._conflict = np.tile(site.conflicts | ~movements.apart, (types, types))
+        self._law, self._traits, self._ways = self.manager._law, self.manager._types, self.manager._ways
+        self._limit = site.limit
 
     def decide(self, view: View) -> Iterable[Command]:
-        self._view = view
-        self._advice: list[Command] = []
-        seen = {(v.lane, v.rank): v for v in view.vehicles}
-        for v in view.vehicles:
-            self.manager.place[v.id] = self._places[v.lane, v.rank]
-        self._seen = seen
-        newest = {}
-        for lane, rank in seen: newest[lane] = max(newest.get(lane, -1), rank)
-        self._newest = getattr(self, "_newest", {})
-        self._newest.update(newest)
-        commands = list(super().decide(view))
-        commands = [c for c in commands if not isinstance(c, Wake)]
-        commands += self._advice
-        commands.append(Wake(view.time + self._period))
-        return commands
+        """Check the passages, grant new ones in order, and advise the others."""
+        self._seen = {(it.lane, it.rank): it for it in view.vehicles}
+        self._advice = []
+        for it in view.vehicles:
+            self.manager.place[it.id] = self._place[it.lane, it.rank]
+            self._newest[it.lane] = max(self._newest.get(it.lane, -1), it.rank)
+        return [*super().decide(view), *self._advice]
 
-    def _grant(self, seen, ahead, now) -> Iterator[int]:
-        slots = self.manager.slots
-        latest = np.full(len(self._ways), -math.inf)
-        blocked = np.zeros(len(self._ways), bool)
+    def _grant(self, seen: dict[int, Observed], ahead: dict[int, int], now: int) -> Iterator[int]:
+        """Grant passages in the order of the schedule; return the ids of the new holders."""
+        free, blocked = np.full(len(self._between), -math.inf), np.zeros(len(self._between), bool)
         left = len(self._seen)
-        while self._first < len(self._order) and self._gone(self._first):
+        while self._first < len(self._turns) and self._passed(self._turns[self._first]):
             self._first += 1
-        for k in range(self._first, len(self._order)):
+        for turn in self._turns[self._first :]:
             if not left:
                 break
-            if self._gone(k):
+            if self._passed(turn):
                 continue
-            lane_rank = self._order[k]
-            kind = self._kinds[k]
-            me = self._seen.get(lane_rank)
-            if me is None:  # still to come
-                time = self._times[k]
-                blocked |= self._conflict[kind]
-                latest = np.maximum(latest, time + self._sep.between[kind])
-                continue
-            left -= 1
-            slot = slots.get(me.id)
-            if slot is None:
-                free = self._free(me, kind, now)
-                time = max(free, latest[kind])
-                slot = None
-                if not blocked[kind] and time - free < 1.0:
-                    slot = self._predict(me, now, ahead.get(me.id))
-                    if slot is not None and self.manager.fits(slot, last=True):
-                        slots[me.id] = slot
-                        self._requests.pop(me.id, None)
-                        self._advice.append(Advise(me.id, math.inf))
-                        yield me.id
-                    else:
-                        slot = None
-                        time = max(time, free + 0.3)
+            me, time, held = self._seen.get((turn.lane, turn.rank)), turn.time, True
+            if me is not None:
+                left -= 1
+                slot = self.manager.slots.get(me.id)
+                held = slot is None
                 if slot is None:
-                    blocked |= self._conflict[kind]
-                    self._advice.append(Advise(me.id, self._speed(me, kind, time - now * self._dt)))
-            if slot is not None:
-                i = int(slot.s.searchsorted(self._marks[kind]))
-                time = (slot.start + i) * self._dt
-            latest = np.maximum(latest, time + self._sep.between[kind])
+                    alone = self._alone(me, turn.kind, now)
+                    time = max(alone, float(free[turn.kind]))
+                    if not blocked[turn.kind] and time - alone < EARLY:
+                        slot = self._passage(me, now, ahead.get(me.id))
+                        time = max(time, alone + AGAIN)
+                if slot is not None:
+                    time = self._at_mark(slot, turn.kind)
+                    if held:
+                        yield me.id
+                        self._advice.append(Advise(me.id, math.inf))
+                    held = False
+                else:
+                    speed = self._speed(me, turn.kind, time - now * self._dt)
+                    self._advice.append(Advise(me.id, speed))
+            if held:
+                blocked |= self._conflict[turn.kind]
+            free = np.maximum(free, time + self._between[turn.kind])
 
-    def _gone(self, k: int) -> bool:
-        if self._passed[k]:
-            return True
-        lane, rank = self._order[k]
-        if (lane, rank) not in self._seen and self._newest.get(lane, -1) >= rank:
-            self._passed[k] = True
-            return True
-        return False
+    def _passed(self, turn: Turn) -> bool:
+        """Whether a vehicle has been in view and is no more."""
+        place = turn.lane, turn.rank
+        return place not in self._seen and self._newest.get(turn.lane, -1) >= turn.rank
 
-    def _free(self, me: Observed, kind: int, now: int) -> float:
-        """When it could be at its mark if it drove on alone."""
-        from baselines.prediction import predict
-        mgr = self.manager
-        run = predict(mgr._law, mgr._types[me.type], mgr._ways[kind % self._m], -me.distance, me.speed)
-        return (now + int(run.s.searchsorted(self._marks[kind]))) * self._dt
+    def _passage(self, me: Observed, now: int, leader: int | None) -> Slot | None:
+        """A vehicle's passage if it fits all others; then it holds it."""
+        slot = self._predict(me, now, leader)
+        if slot is None or not self.manager.fits(slot, last=True):
+            return None
+        self.manager.slots[me.id] = slot
+        self._requests.pop(me.id, None)
+        return slot
+
+    def _at_mark(self, slot: Slot, kind: int) -> float:
+        return (slot.start + int(slot.s.searchsorted(self._marks[kind]))) * self._dt
+
+    def _alone(self, me: Observed, kind: int, now: int) -> float:
+        """When a vehicle would pass its mark if it drove on alone [s]."""
+        way = self._ways[kind % len(self._ways)]
+        run = predict(self._law, self._traits[me.type], way, -me.distance, me.speed)
+        return (now + int(run.s.searchsorted(self._marks[kind]))) * self._dt if run else math.inf
 
     def _speed(self, me: Observed, kind: int, left: float) -> float:
-        way = self._ways[kind]
-        limit = self._site.limit(me.lane)
+        """The speed at which a vehicle passes its mark in the time that is left [m/s].
+
+        It drives at this speed until it has to accelerate or brake for the speed at the entry.
+        """
+        way, it, limit, u = self._drives[kind], self._traits[me.type], self._limit(me.lane), me.speed
         final = float(way.speed(0.0))
-        a = self.manager._types[me.type].a * 0.6
-        b = self.manager._types[me.type].b
-        u = me.speed
-        for _ in range(3):
-            x = (final * final - u * u) / (2 * a) if u < final else (u * u - final * final) / (2 * b)
-            x = min(x, max(me.distance - 1.0, 0.0))
-            mean = (u + final) / 2.0
-            rest = x / max(mean, 1.0) + float(way.until(self._marks[kind]))
-            u = min(max((me.distance - x) / max(left - rest, 0.1), 2.0), limit)
+        for _ in range(3):  # the speed depends on where that is, and the other way round
+            a = it.a * SHARE if u < final else it.b
+            run_up = min(abs(final * final - u * u) / (2.0 * a), max(me.distance - 1.0, 0.0))
+            rest = 2.0 * run_up / max(u + final, 2.0) + self._past[kind]
+            u = min(max((me.distance - run_up) / max(left - rest, 0.1), SLOWEST), limit)
         return u if u < limit else math.inf

@@ -22,6 +22,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -44,7 +45,7 @@ from minisim.vehicle import VehicleType
 STEP, MARK_STEP = 0.1, 0.5
 
 #: How many speeds of a follower are tried.
-SPEEDS = 30
+SPEEDS = 60
 
 #: How far past the junction vehicles are compared that follow each other on an exit lane [m].
 PAST = 50.0
@@ -106,6 +107,12 @@ class Needs(NamedTuple):
 
 def necessary(site: Site, depart_speed: float | None = None) -> Needs:
     """The needs of a site's vehicles, by kind: the movements of each type in turn."""
+    alike = replace(site, seed=0, demand=(0.0,) * site.intersection.n, inflow=None)
+    return _necessary(alike, depart_speed)
+
+
+@lru_cache(maxsize=64)
+def _necessary(site: Site, depart_speed: float | None) -> Needs:
     ways = drives(site, depart_speed)
     marks = _places(site)
     tables, same = _tables(site, ways, marks)
@@ -133,7 +140,8 @@ def _approach(site: Site, kind: int, way: Drive) -> Floats:
     junction, m = site.intersection, len(site.intersection.movements)
     it, limit = site.types[kind // m], site.limit(int(junction.movements.origins[kind % m]))
     free = np.flatnonzero((way.s <= 0.0) & (way.v >= limit * (1.0 - 1e-6)))
-    return _losses(site, it, limit, way, 0, int(free.max(initial=0)), it.length, APPROACH)
+    end, gone = int(free.max(initial=0)), -float(way.s[0])
+    return _losses(site, it, limit, way, (0, end), gone, it.length, APPROACH)
 
 
 def _wake(site: Site, kind: int, way: Drive) -> tuple[float, Floats]:
@@ -142,21 +150,23 @@ def _wake(site: Site, kind: int, way: Drive) -> tuple[float, Floats]:
     path, it = junction.paths[kind % m], site.types[kind // m]
     begin = int(way.s.searchsorted(path.crossing + min(PAST, (way.s[-1] - path.crossing) / 2.0)))
     length = min(one.length for one in site.types)
-    lost = _losses(site, it, site.limit(path.exit_arm), way, begin, -1, length, WAKE)
+    gone, limit = float(way.s[-1] - way.s[begin]), site.limit(path.exit_arm)
+    lost = _losses(site, it, limit, way, (begin, -1), gone, length, WAKE)
     return float(way.time[begin]), np.maximum(lost - lost[-1], 0.0)
 
 
 def _losses(
-    site: Site, it: VehicleType, limit: float, way: Drive, begin: int, end: int, length: float,
-    longest: float,
+    site: Site, it: VehicleType, limit: float, way: Drive, ends: tuple[int, int], gone: float,
+    length: float, longest: float,
 ) -> Floats:  # fmt: skip
     count = round(longest / WAKE_STEP) + 1
     if law_of(site).model != IDM:
         return np.zeros(count)
-    far, alone = (float(it[end] - it[begin]) for it in (way.s, way.time))
+    far, alone = (float(it[ends[1]] - it[ends[0]]) for it in (way.s, way.time))
     return least_losses(
-        traits_of(it), limit, site.dt, length, far, float(way.v[begin]), alone, (WAKE_STEP, count)
-    )
+        traits_of(it), limit, site.dt, length, far, gone, float(way.v[ends[0]]), alone,
+        WAKE_STEP, count,
+    )  # fmt: skip
 
 
 def _places(site: Site) -> Floats:
@@ -223,19 +233,20 @@ def _behind(
     a gap behind, and has to accelerate from there.
     """
     table = np.full((len(marks), len(marks)), -math.inf)
-    v = np.linspace(0.0, gaps.speed[-1], SPEEDS)[:, None]
+    v = np.linspace(0.0, gaps.speed[-1], SPEEDS + 1)[:, None]
     x = np.arange(-BEFORE, marks[-1] + STEP, STEP)
     bound = second.speed(x)
     fastest = np.maximum(bound[:-1], bound[1:])
     for k in np.flatnonzero(marks < until).tolist():
-        place = marks[k] - length - np.interp(v, *gaps)
-        # A step is as fast as at its end, for all rules of moving.
+        place = marks[k] - length - np.interp(v[:-1], *gaps)
+        # Between two speeds, its gap is at least that of the lower one. A step is as fast as at its
+        # end, for all rules of moving.
         ahead = np.maximum(x[1:] - place, 0.0)
-        rising = np.sqrt((v + acceleration * dt) ** 2 + 2.0 * acceleration * ahead)
+        rising = np.sqrt((v[1:] + acceleration * dt) ** 2 + 2.0 * acceleration * ahead)
         needed = np.where(x[:-1] >= place, STEP / np.minimum(fastest, rising), 0.0)
         time = np.concatenate([np.zeros((SPEEDS, 1)), needed.cumsum(axis=1)], axis=1)
         at_marks = np.array([np.interp(marks, x, row) for row in time])
-        at_marks[(v > second.speed(place))[:, 0]] = math.inf
+        at_marks[(v[:-1] > second.speed(place))[:, 0]] = math.inf
         least = float(first.until(marks[k])) + at_marks.min(axis=0)
         least[marks < place.max()] = -math.inf
         table[: k + 1] = np.maximum(table[: k + 1], least)
