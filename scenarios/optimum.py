@@ -8,9 +8,9 @@ per trip. Every vehicle counts, so runs go on until the last one has arrived.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -22,9 +22,10 @@ from baselines.prediction import Floats
 from minisim.arrivals import Arrivals, ranks
 from minisim.control import Controller, Cover, Site
 from minisim.engine.state import types_of
-from minisim.errors import InputError
+from minisim.errors import CollisionError, InputError
 from minisim.junction.movements import Ints
-from minisim.results.run import Run, ScenarioLike
+from minisim.names import name_of
+from minisim.results.run import Run
 from minisim.simulation import simulate
 from scenarios.scenario import Scenario
 
@@ -70,9 +71,20 @@ class Optimum(NamedTuple):
     schedule: Scheduled  #: a controller that keeps it
     at_limit: float  #: what the ways take at the limits, from demand time 0 [s]
 
-    def delay(self, run: Run) -> float:
-        """The mean delay of a run [s]; infinite if a vehicle has not arrived."""
+    @property
+    def facts(self) -> dict[str, Any]:
+        """The numbers, for JSON."""
+        return {"vehicles": self.vehicles, "bound_s": self.bound, "planned_s": self.planned}
+
+    def above(self, delay: float) -> float | None:
+        """By how much a mean delay [s] exceeds the bound [%]; None if the bound is 0."""
+        return 100.0 * (delay - self.bound) / self.bound if self.bound > 0.0 else None
+
+    def delay(self, run: Run) -> float | None:
+        """The mean delay of a run [s]; None if a vehicle has not arrived."""
         arrival = run.columns.arrival
+        if np.isnan(arrival).any():
+            return None
         return float(arrival.mean()) - self.at_limit if len(arrival) else 0.0
 
 
@@ -95,18 +107,28 @@ def optimum(scenario: Scenario, seed: int = 0) -> Optimum:
     )
     at_limit = float((arrivals.time + needs.at_limit[kind]).sum())
     mean = 1.0 / max(count, 1)
-    return Optimum(
-        count, (least.bound - at_limit) * mean, (float(best.arrival.sum()) - at_limit) * mean,
-        Scheduled(turns), at_limit * mean,
-    )  # fmt: skip
+    bound, planned = max(least.bound - at_limit, 0.0), float(best.arrival.sum()) - at_limit
+    return Optimum(count, bound * mean, planned * mean, Scheduled(turns), at_limit * mean)
 
 
-def driven(
-    scenario: Scenario, controller: Controller, seed: int = 0,
+def compared(
+    scenario: Scenario, controllers: Iterable[Controller], seed: int, least: Optimum,
     host: Callable[..., Run] = simulate,
-) -> Run:  # fmt: skip
-    """Run a scenario until the last vehicle has arrived; a collision raises `CollisionError`."""
-    return host(Drained(scenario), controller, seed)
+) -> Iterator[dict[str, Any]]:  # fmt: skip
+    """For the schedule as driven, and each controller: name, mean delay, and how far above.
+
+    A collision ends a run: the row of a controller says so, and has no delay.
+    """
+    for controller in (least.schedule, *controllers):
+        own = controller is least.schedule
+        row: dict[str, Any] = {"controller": "schedule" if own else name_of(controller)}
+        try:
+            delay = least.delay(host(Drained(scenario), controller, seed))
+            why = "a vehicle did not arrive" if delay is None else ""
+        except CollisionError as error:
+            delay, why = None, str(error)
+        above = None if delay is None else least.above(delay)
+        yield row | {"delay_s": delay, "above_percent": above, "error": why}
 
 
 def _check(site: Site, arrivals: Arrivals) -> None:

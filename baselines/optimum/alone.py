@@ -11,6 +11,7 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from baselines.prediction import Course, Floats, courses, law_of
 from minisim.control import Site
@@ -38,13 +39,17 @@ class Drive(NamedTuple):
         """What it loses at least on its whole way against driving at the limits [s]."""
         return float(self.time[-1] - self.time[0]) - self.at_limit
 
-    def until(self, s: Floats | float) -> Floats:
+    def until(self, s: npt.ArrayLike) -> Floats:
         """Least time from the entry to a place [s]."""
-        return np.interp(s, self.s, self.time)
+        return np.asarray(np.interp(np.asarray(s, float), self.s, self.time))
 
-    def speed(self, s: Floats | float) -> Floats:
+    def place(self, time: float) -> float:
+        """The place that is reached in this time from the entry [s], at the earliest [m]."""
+        return float(np.interp(time, self.time, self.s))
+
+    def speed(self, s: npt.ArrayLike) -> Floats:
         """Upper bound on the speed at a place [m/s]."""
-        return np.interp(s, self.s, self.v)
+        return np.asarray(np.interp(np.asarray(s, float), self.s, self.v))
 
 
 def drives(site: Site, depart_speed: float | None = None) -> tuple[Drive, ...]:
@@ -69,7 +74,9 @@ def _drive(law: Law, me: Traits, way: Course, start: float, depart: float | None
     v = limit.copy()
     first = way.before if depart is None else min(depart, way.before)
     for place, speed, behind in (
-        (start, first, way.before), (0.0, way.before, way.turn), (way.crossing, way.turn, way.behind),
+        (start, first, way.before),
+        (0.0, way.before, way.turn),
+        (way.crossing, way.turn, way.behind),
     ):  # fmt: skip
         after = s >= place
         if behind > speed:

@@ -1,18 +1,18 @@
 """What the IDM costs a vehicle behind another, whatever that one does.
 
-*Gaps.* The IDM brakes where the gap is below s0 + vT. So there is a curve g(v) of gaps over speeds that a
-vehicle never falls below, once it is above: on the curve, the gap shrinks no faster than the curve
-falls as the vehicle slows down (a control barrier; Ames et al. 2017, IEEE TAC 62:3861). With w the
-leader's speed, that is w − v ≥ g'(v)·v̇ for every w. The curve is built from this with a reserve for
-the step, and then tested: one step from every state near it, and from below it, by both rules of
-moving (`ballistic`, `semi_implicit`), with a leader that brakes or accelerates as it can.
+*Gaps.* The IDM brakes where the gap is below s0 + vT. So there is a curve g(v) of gaps over speeds
+that a vehicle never falls below, once it is above: on the curve, the gap shrinks no faster than the
+curve falls as the vehicle slows down (a control barrier; Ames et al. 2017, IEEE TAC 62:3861). With
+w the leader's speed, that is w − v ≥ g'(v)·v̇ for every w. The curve is built from this with a
+reserve for the step, and then tested: one step from every state near it, and from below it, by both
+rules of moving (`ballistic`, `semi_implicit`), with a leader that brakes or accelerates as it can.
 
-Vehicles are inserted with less behind a faster leader. Below the curve a gap recovers, by `RECOVERY`
-per metre driven at least, which the test shows too.
+Vehicles are inserted with less behind a faster leader. Below the curve a gap recovers, by
+`RECOVERY` per second at least, which the test shows too.
 
-*Losses.* On a road with a limit u, a leader that has passed a place is nowhere ahead of a point that
-leaves this place then and drives at u. Behind the leader the law asks for no more than behind that
-point, from which the distance z only grows. So v as a function of z is below the solution of
+*Losses.* On a road with a limit u, a leader that has passed a place is nowhere ahead of a point
+that leaves this place then and drives at u. Behind the leader the law asks for no more than behind
+that point, from which the distance z only grows. So v as a function of z is below the solution of
 dv/dz = v̇(z, v, u)/(u − v) (two solutions of an equation of first order do not cross), and z and the
 time lost are above. This holds for any braking of both. The point counts until it leaves the road,
 which the leader does no earlier. A vehicle may also wait first, and follow further behind.
@@ -94,7 +94,8 @@ def least_losses(
 def least_gaps(me: Traits, limit: float, dt: float, driven: float, braking: float) -> Gaps:
     """The curve of a vehicle that has driven so far since its insertion [m], up to `limit` [m/s].
 
-    Its leaders may brake at `braking` [m/s²]. Without any curve that passes its test, gaps are only known to be positive.
+    Its leaders may brake at `braking` [m/s²]. Without any curve that passes its test, gaps are only
+    known to be positive.
     """
     for share, extra in itertools.product(SHARES, EXTRA):
         curve = _curve(me, limit, dt, braking, share, RECOVERY + extra)
@@ -104,7 +105,9 @@ def least_gaps(me: Traits, limit: float, dt: float, driven: float, braking: floa
     return Gaps(np.array([0.0, limit]), np.zeros(2))
 
 
-def _accelerations(me: Traits, v: Floats, gap: Floats, w: Floats, limit: float, dt: float) -> Floats:
+def _accelerations(
+    me: Traits, v: Floats, gap: Floats, w: Floats, limit: float, dt: float
+) -> Floats:
     """What the IDM does at speeds v behind leaders of speeds w, within the brakes [m/s²]."""
     dynamic = v * me.headway + v * (v - w) / (2.0 * math.sqrt(me.a * me.b))
     wanted = me.min_gap + np.maximum(dynamic, 0.0)
@@ -115,7 +118,7 @@ def _accelerations(me: Traits, v: Floats, gap: Floats, w: Floats, limit: float, 
 def _curve(
     me: Traits, limit: float, dt: float, braking: float, share: float, recovery: float
 ) -> Gaps:
-    """The highest curve that keeps the condition, from `share` of s0 + vT at the limit downwards."""
+    """The highest curve that keeps the condition, from `share` of s0 + vT at the limit on."""
     speed = np.linspace(limit, 0.0, SPEEDS)
     w, gap = np.linspace(0.0, limit, 2 * SPEEDS), np.zeros(SPEEDS)
     gap[0] = share * (me.min_gap + limit * me.headway)
@@ -137,9 +140,7 @@ def _curve(
     return Gaps(speed[::-1], gap[::-1])
 
 
-def _kept(
-    curve: Gaps, me: Traits, limit: float, dt: float, braking: float, stepwise: bool
-) -> bool:
+def _kept(curve: Gaps, me: Traits, limit: float, dt: float, braking: float, stepwise: bool) -> bool:
     """Whether one step keeps gaps above the curve, and lets those below it recover."""
     off = np.concatenate([np.arange(-ABOVE, 1.0, 0.1), np.arange(1.0, BELOW, 1.0)])[:, None, None]
     w = np.linspace(0.0, limit, LEADERS)[None, :, None]

@@ -8,8 +8,7 @@ import numpy as np
 
 from baselines.optimum.alone import Drive, drives
 from baselines.optimum.separations import Needs, necessary
-from baselines.optimum.sequencing import Rules
-from baselines.prediction import Leader, Motion, courses, law_of, predict
+from baselines.prediction import Floats, Leader, Motion, courses, law_of, predict
 from minisim.control import Site
 from minisim.junction.coordination import STEP, region
 from minisim.junction.partings import branch
@@ -42,7 +41,7 @@ def drivable(site: Site, buffer: float, depart_speed: float | None = None) -> Ne
         elif (near := region(junction, types[i // m], p, q, types[j // m])) is not None:
             rows, columns = np.nonzero(near.close)
             first, second = ways[i].until((rows + 1) * STEP), ways[j].until(columns * STEP)
-            least = float((first - second).max()) + buffer + marks[j] - marks[i]
+            least = float((first - second).max() + buffer + marks[j] - marks[i])
         else:
             continue
         between[i, j] = max(least, LEAST)
@@ -52,7 +51,7 @@ def drivable(site: Site, buffer: float, depart_speed: float | None = None) -> Ne
 
 
 def _following(
-    site: Site, ways: Sequence[Drive], kinds: tuple[int, int], marks: np.ndarray, until: float
+    site: Site, ways: Sequence[Drive], kinds: tuple[int, int], marks: Floats, until: float
 ) -> float:
     """The least time between the marks of two vehicles of a lane that drive by their law [s]."""
     law, m = law_of(site), len(site.intersection.movements)
@@ -77,5 +76,4 @@ def _following(
 
 def _passes(run: Motion, way: Drive, mark: float, dt: float) -> float:
     """When a vehicle passes its mark [s]."""
-    place = np.interp(mark, way.time, way.s)
-    return float(np.interp(place, run.s, dt * np.arange(len(run.s))))
+    return float(np.interp(way.place(mark), run.s, dt * np.arange(len(run.s))))

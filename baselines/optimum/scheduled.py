@@ -22,8 +22,8 @@ from baselines.optimum.alone import drives
 from baselines.optimum.planning import drivable
 from baselines.prediction import predict
 from baselines.reservation import Manager, Reservation, ReservationSession, Slot
-from minisim.control import Advise, Command, Cover, Go, Observed, Plan, Site, View
-from minisim.junction.coordination import Region, region
+from minisim.control import Advise, Command, Cover, Observed, Plan, Site, View
+from minisim.junction.coordination import STEP, Region, region
 from minisim.names import Name
 from minisim.parameters import checked, declared, real
 
@@ -84,6 +84,12 @@ class Bodies(Manager):
         self._number = {it: k for k, it in enumerate(self._types)}
         self._conflicts = site.conflicts
 
+    def alone(self, me: Observed, now: int, mark: float) -> float:
+        """When a vehicle would be at a place past the entry [m] if it drove on alone [steps]."""
+        way = self._ways[self._rows[me.lane][me.manoeuvre]]
+        run = predict(self._law, self._types[me.type], way, -me.distance, me.speed)
+        return math.inf if run is None else now + int(run.s.searchsorted(mark))
+
     def fits(self, slot: Slot, *, last: bool) -> bool:  # noqa: ARG002  (Manager's argument)
         """Whether a passage fits every other."""
         return not slot.hard and all(
@@ -107,7 +113,7 @@ class Bodies(Manager):
         begin = max(slot.start, other.start)
         moments = np.arange(begin, min(slot.ends, other.ends), MOMENT / self._dt)
         mine = np.interp(moments, np.arange(slot.start, slot.ends + 1), slot.s)
-        moments = moments[(mine > 0.0) & (mine < len(near.close))]  # the grid has steps < 1 m
+        moments = moments[(mine > 0.0) & (mine < STEP * len(near.close))]
         mine = np.interp(moments, np.arange(slot.start, slot.ends + 1), slot.s)
         its = np.arange(other.start, other.ends + 1)
         return any(
@@ -135,11 +141,10 @@ class ScheduledSession(ReservationSession):
         self._between, self._drives = needs.rules.between, ways
         at_mark = needs.until - [way.before for way in ways]
         self._past = at_mark.tolist()  # least time from the entry to the mark [s]
-        self._marks = [float(np.interp(t, way.time, way.s)) for t, way in zip(at_mark, ways)]
+        self._marks = [way.place(t) for way, t in zip(ways, self._past, strict=True)]
         movements, types = site.intersection.movements, len(site.types)
         self._conflict = np.tile(site.conflicts | ~movements.apart, (types, types))
-        self._law, self._traits, self._ways = self.manager._law, self.manager._types, self.manager._ways
-        self._limit = site.limit
+        self._limit, self._types = site.limit, site.types
 
     def decide(self, view: View) -> Iterable[Command]:
         """Check the passages, grant new ones in order, and advise the others."""
@@ -153,7 +158,7 @@ class ScheduledSession(ReservationSession):
     def _grant(self, seen: dict[int, Observed], ahead: dict[int, int], now: int) -> Iterator[int]:
         """Grant passages in the order of the schedule; return the ids of the new holders."""
         free, blocked = np.full(len(self._between), -math.inf), np.zeros(len(self._between), bool)
-        left = len(self._seen)
+        left = len(seen)
         while self._first < len(self._turns) and self._passed(self._turns[self._first]):
             self._first += 1
         for turn in self._turns[self._first :]:
@@ -167,7 +172,7 @@ class ScheduledSession(ReservationSession):
                 slot = self.manager.slots.get(me.id)
                 held = slot is None
                 if slot is None:
-                    alone = self._alone(me, turn.kind, now)
+                    alone = self.manager.alone(me, now, self._marks[turn.kind]) * self._dt
                     time = max(alone, float(free[turn.kind]))
                     if not blocked[turn.kind] and time - alone < EARLY:
                         slot = self._passage(me, now, ahead.get(me.id))
@@ -202,21 +207,15 @@ class ScheduledSession(ReservationSession):
     def _at_mark(self, slot: Slot, kind: int) -> float:
         return (slot.start + int(slot.s.searchsorted(self._marks[kind]))) * self._dt
 
-    def _alone(self, me: Observed, kind: int, now: int) -> float:
-        """When a vehicle would pass its mark if it drove on alone [s]."""
-        way = self._ways[kind % len(self._ways)]
-        run = predict(self._law, self._traits[me.type], way, -me.distance, me.speed)
-        return (now + int(run.s.searchsorted(self._marks[kind]))) * self._dt if run else math.inf
-
     def _speed(self, me: Observed, kind: int, left: float) -> float:
         """The speed at which a vehicle passes its mark in the time that is left [m/s].
 
         It drives at this speed until it has to accelerate or brake for the speed at the entry.
         """
-        way, it, limit, u = self._drives[kind], self._traits[me.type], self._limit(me.lane), me.speed
-        final = float(way.speed(0.0))
+        it, limit, u = self._types[me.type], self._limit(me.lane), me.speed
+        final = float(self._drives[kind].speed(0.0))
         for _ in range(3):  # the speed depends on where that is, and the other way round
-            a = it.a * SHARE if u < final else it.b
+            a = it.acceleration * SHARE if u < final else it.deceleration
             run_up = min(abs(final * final - u * u) / (2.0 * a), max(me.distance - 1.0, 0.0))
             rest = 2.0 * run_up / max(u + final, 2.0) + self._past[kind]
             u = min(max((me.distance - run_up) / max(left - rest, 0.1), SLOWEST), limit)

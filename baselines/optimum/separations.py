@@ -197,9 +197,7 @@ def _tables(site: Site, ways: Sequence[Drive], marks: Floats) -> tuple[Floats, B
                 same[i, j] = True
                 until = float(reach[p, q]) + one.length
                 a = other.acceleration
-                tables[i, j] = _behind(
-                    gaps, ways[i], ways[j], marks, one.length, until, a, site.dt
-                )
+                tables[i, j] = _behind(gaps, ways[i], ways[j], marks, one.length, until, a, site.dt)
     return tables, same
 
 

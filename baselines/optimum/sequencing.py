@@ -122,7 +122,8 @@ def _due(queue: Queue, kinds: int) -> Floats:
 @njit_inline
 def _arrives(rules: Rules, kind: int, time: float, ahead: float) -> float:
     """When a vehicle arrives that passes its mark at `time`, behind one out at `ahead` [s]."""
-    return time + rules.rest[kind] + _lost(rules, kind, time + rules.past[kind] - ahead)
+    lost = _lost(rules, kind, time + rules.past[kind] - ahead)
+    return float(time + rules.rest[kind] + lost)
 
 
 @njit_inline
@@ -133,14 +134,14 @@ def _lost(rules: Rules, kind: int, behind: float) -> float:
         return 0.0
     k = int(place)
     left = rules.wake[kind, k] + (place - k) * (rules.wake[kind, k + 1] - rules.wake[kind, k])
-    return left - min(behind, 0.0)
+    return float(left - min(behind, 0.0))
 
 
 @allocating
 def _next(
     queue: Queue, rules: Rules, due: Floats, at: Ints, free: Floats, ahead: Floats, cost: Floats
 ) -> tuple[Ints, Floats, Floats, Floats, Ints, Ints]:
-    """All states with one vehicle more: their arrays, and from which and by which lane they come."""
+    """All states with one vehicle more: their arrays, from which, and by which lane they come."""
     count, lanes = at.shape
     kinds = len(rules.rest)
     ats = np.empty((count * lanes, lanes), np.int64)
@@ -156,7 +157,8 @@ def _next(
             come = i < queue.begins[lane + 1]
             early[lane] = free[row, queue.kind[i]] if come else np.inf
         for lane in range(lanes):
-            if early[lane] == np.inf or _after(queue, rules, due, at, free, ahead, early, row, lane):
+            state = at[row], free[row], ahead[row]
+            if early[lane] == np.inf or _after(queue, rules, due, state, early, lane):
                 continue
             i = at[row, lane]
             kind, time = queue.kind[i], early[lane]
@@ -187,24 +189,25 @@ def _next(
 
 @njit_inline
 def _after(
-    queue: Queue, rules: Rules, due: Floats, at: Ints, free: Floats, ahead: Floats, early: Floats,
-    row: int, lane: int,
+    queue: Queue, rules: Rules, due: Floats, state: tuple[Ints, Floats, Floats], early: Floats,
+    lane: int,
 ) -> bool:  # fmt: skip
     """Whether the next vehicle of another lane should go before this one.
 
     Both in the other order, that one could be moved before this one: it delays none, and gains more
     than it loses on its exit lane and costs the vehicles that are now behind it there.
     """
+    at, free, ahead = state
     for other in range(len(early)):
         time, gain = early[other], early[lane] - early[other]
         if other == lane or not gain > 0.0:
             continue
-        i = at[row, other]
+        i = at[other]
         kind = queue.kind[i]
         out = time + rules.past[kind]
-        gain -= _lost(rules, kind, out - ahead[row, kind])
+        gain -= _lost(rules, kind, out - ahead[kind])
         for k in range(len(rules.rest)):
-            if free[row, k] > -np.inf and due[i + other, k] == -np.inf:
+            if free[k] > -np.inf and due[i + other, k] == -np.inf:
                 if time + rules.between[kind, k] > early[lane]:
                     gain = 0.0
                 if rules.joins[kind, k]:
@@ -243,9 +246,7 @@ def _best(rules: Rules, key: Ints, free: Floats, ahead: Floats, cost: Floats) ->
 
 
 @njit_inline
-def _better(
-    rules: Rules, free: Floats, ahead: Floats, cost: Floats, one: int, other: int
-) -> bool:
+def _better(rules: Rules, free: Floats, ahead: Floats, cost: Floats, one: int, other: int) -> bool:
     """Whether no way on from a state ends better than the same way on from another one.
 
     A vehicle further ahead on an exit lane costs only the next one of each kind, and most if that
@@ -263,4 +264,4 @@ def _better(
             spare += _lost(rules, kind, out - ahead[other, kind])
             if spare < 0.0:
                 return False
-    return spare >= 0.0
+    return bool(spare >= 0.0)

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from figures.studies.shared.section import Item
     from minisim.counts import Count
+    from scenarios.optimum import Optimum
     from scenarios.recipe import Recipe
 
 #: The closest calls, which are printed for every run.
@@ -101,6 +102,32 @@ def _safety(summary: Mapping[str, Any]) -> Text:
         value = _seconds(summary[metric.name], f" {metric.unit}")
         line.append(f"   {metric.title} ").append(value, "bold")
     return line
+
+
+def optimum_parts(
+    what: str, least: Optimum, rows: Iterable[Mapping[str, Any]]
+) -> Iterator[Text | Table]:
+    """The bound, the schedule, and how far each controller is above."""
+    yield Text.assemble((what, "bold"), f": {least.vehicles} vehicles, mean delay")
+    table = Table(box=box.SIMPLE_HEAD)
+    for title in ("", "delay [s]", "above the bound [%]"):
+        table.add_column(title, justify="right" if title else "left")
+    planned = {"controller": "schedule, as planned", "delay_s": least.planned}
+    table.add_row("bound", f"{least.bound:.3f}", "", style="bold")
+    table.add_row(*_above(planned | {"above_percent": least.above(least.planned)}))
+    for k, row in enumerate(rows):
+        schedule = {"controller": "schedule, as driven"} if k == 0 else {}
+        table.add_row(*_above({**row, **schedule}), end_section=k == 0)
+    yield table
+    for row in rows:
+        if row["error"]:
+            yield Text(f"  {row['controller']}: {row['error']}", "yellow")
+
+
+def _above(row: Mapping[str, Any]) -> tuple[str, str, str]:
+    delay, above = row["delay_s"], row["above_percent"]
+    shown = "–" if delay is None else f"{delay:.3f}"
+    return row["controller"], shown, "–" if above is None else f"{above:.1f}"
 
 
 def gallery_table(items: Iterable[Item]) -> Table:

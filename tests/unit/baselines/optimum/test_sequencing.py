@@ -33,16 +33,13 @@ def random_case(rng: np.random.Generator) -> tuple[Queue, Rules]:
 
 
 def lost(rules: Rules, kind: int, behind: float) -> float:
-    return float(
-        np.interp(behind, WAKE_STEP * np.arange(60), rules.wake[kind]) - min(behind, 0.0)
-    )
+    return float(np.interp(behind, WAKE_STEP * np.arange(60), rules.wake[kind]) - min(behind, 0.0))
 
 
 def brute_force(queue: Queue, rules: Rules) -> float:
     """The least sum of arrivals of all orders that keep each lane's, by trying every one."""
-    Passed = list[tuple[int, float]]
 
-    def sums(at: list[int], passed: Passed) -> Iterator[float]:
+    def sums(at: list[int], passed: list[tuple[int, float]]) -> Iterator[float]:
         over = True
         for lane, i in enumerate(at):
             if i < queue.begins[lane + 1]:
