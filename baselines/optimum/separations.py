@@ -45,7 +45,7 @@ from minisim.vehicle import VehicleType
 STEP, MARK_STEP = 0.1, 0.5
 
 #: How many speeds of a follower are tried.
-SPEEDS = 60
+SPEEDS = 40
 
 #: How far past the junction vehicles are compared that follow each other on an exit lane [m].
 PAST = 50.0
@@ -233,6 +233,7 @@ def _behind(
     table = np.full((len(marks), len(marks)), -math.inf)
     v = np.linspace(0.0, gaps.speed[-1], SPEEDS + 1)[:, None]
     x = np.arange(-BEFORE, marks[-1] + STEP, STEP)
+    at = np.round((marks + BEFORE) / STEP).astype(int)
     bound = second.speed(x)
     fastest = np.maximum(bound[:-1], bound[1:])
     for k in np.flatnonzero(marks < until).tolist():
@@ -243,7 +244,7 @@ def _behind(
         rising = np.sqrt((v[1:] + acceleration * dt) ** 2 + 2.0 * acceleration * ahead)
         needed = np.where(x[:-1] >= place, STEP / np.minimum(fastest, rising), 0.0)
         time = np.concatenate([np.zeros((SPEEDS, 1)), needed.cumsum(axis=1)], axis=1)
-        at_marks = np.array([np.interp(marks, x, row) for row in time])
+        at_marks = time[:, at]
         at_marks[(v[:-1] > second.speed(place))[:, 0]] = math.inf
         least = float(first.until(marks[k])) + at_marks.min(axis=0)
         least[marks < place.max()] = -math.inf

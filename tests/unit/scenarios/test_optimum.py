@@ -1,0 +1,79 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from baselines import Reservation
+from minisim.arrivals import Arrivals
+from minisim.control import Unregulated
+from minisim.errors import InputError
+from minisim.simulation import simulate
+from minisim.vehicle import VehicleType
+from scenarios.library import four_way
+from scenarios.optimum import Drained, compared, optimum
+from scenarios.profiles import AS_RUN, FAIR
+from tests.builders import replayed
+
+SCENARIO = four_way(profile=FAIR, density=200.0, horizon=120.0)
+
+
+def test_the_schedule_is_driven_without_collision_a_little_above_the_bound() -> None:
+    least = optimum(SCENARIO, 1)
+    schedule, reservation = compared(SCENARIO, [Reservation()], 1, least)
+    assert 0.0 < least.bound <= least.planned <= schedule["delay_s"]
+    assert least.bound <= reservation["delay_s"]
+    assert schedule["error"] == ""
+    assert schedule["above_percent"] == pytest.approx(
+        100.0 * (schedule["delay_s"] / least.bound - 1.0)
+    )
+
+
+def test_one_vehicle_straight_on_loses_no_more_than_it_must() -> None:
+    least = optimum(replayed(SCENARIO, (1.02, 0, 2), horizon=100.0))
+    assert least.bound == pytest.approx(0.08)  # it enters at the next step
+
+
+def test_without_vehicles_there_is_no_delay() -> None:
+    none = four_way(profile=FAIR, density=0.0, horizon=60.0)
+    least = optimum(none)
+    assert (least.vehicles, least.bound, least.planned) == (0, 0.0, 0.0)
+    assert [row["delay_s"] for row in compared(none, [], 0, least)] == [0.0]
+
+
+def test_the_delay_is_the_control_delay_up_to_a_step_per_trip() -> None:
+    least = optimum(SCENARIO, 1)
+    run = simulate(Drained(SCENARIO), Reservation(), 1)
+    mean = run.summary(["control_delay_s"])["control_delay_s"]
+    assert least.delay(run) == pytest.approx(mean, abs=SCENARIO.profile.dt)
+
+
+def test_a_collision_is_said_in_the_row() -> None:
+    crossing = replayed(SCENARIO, (1.0, 0, 2), (1.0, 1, 2), horizon=100.0)
+    _, row = compared(crossing, [Unregulated()], 0, optimum(crossing))
+    assert row["delay_s"] is None
+    assert "touched" in row["error"]
+
+
+@pytest.mark.parametrize(
+    ("scenario", "why"),
+    [
+        (four_way(profile=AS_RUN), "model 'cc'"),
+        (four_way(profile=replace(FAIR, vehicle=VehicleType(speed_deviation=0.1))), "alike"),
+        (
+            four_way(profile=replace(FAIR, vehicle=VehicleType(model="krauss", sumo="1.18"))),
+            "sumo='1.18'",
+        ),
+        (
+            replace(
+                SCENARIO,
+                recorded=Arrivals(
+                    np.array([1.0]), np.array([0]), np.array([1]), speed_factor=np.array([1.1])
+                ),
+            ),
+            "speed factors",
+        ),
+    ],
+)
+def test_vehicles_without_a_bound_are_refused(scenario, why: str) -> None:
+    with pytest.raises(InputError, match=why):
+        optimum(scenario)
