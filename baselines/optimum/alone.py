@@ -20,6 +20,9 @@ from minisim.laws import Law, Traits, follow, traits_of, within
 #: Spacing of the places on a path [m].
 STEP = 0.1
 
+#: More than a speed is off that is interpolated between two places [m/s].
+BETWEEN = 1e-3
+
 
 class Drive(NamedTuple):
     """One movement of one type of vehicle, alone. Places count from the junction entry [m]."""
@@ -49,7 +52,7 @@ class Drive(NamedTuple):
 
     def speed(self, s: npt.ArrayLike) -> Floats:
         """Upper bound on the speed at a place [m/s]."""
-        return np.asarray(np.interp(np.asarray(s, float), self.s, self.v))
+        return np.asarray(np.interp(np.asarray(s, float), self.s, self.v) + BETWEEN)
 
 
 def drives(site: Site, depart_speed: float | None = None) -> tuple[Drive, ...]:

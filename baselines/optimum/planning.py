@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 
 from baselines.optimum.alone import Drive, drives
-from baselines.optimum.separations import Needs, necessary
+from baselines.optimum.separations import Needs, alike, necessary
 from baselines.prediction import Floats, Leader, Motion, courses, law_of, predict
 from minisim.control import Site
 from minisim.junction.coordination import STEP, region
@@ -27,6 +28,11 @@ def drivable(site: Site, buffer: float, depart_speed: float | None = None) -> Ne
 
     In a lane they follow each other as their law lets them from the best of some equal speeds.
     """
+    return _drivable(alike(site), buffer, depart_speed)
+
+
+@lru_cache(maxsize=64)
+def _drivable(site: Site, buffer: float, depart_speed: float | None) -> Needs:
     needs, ways = necessary(site, depart_speed), drives(site, depart_speed)
     junction, types, m = site.intersection, site.types, len(site.intersection.movements)
     marks = needs.until - [way.before for way in ways]

@@ -107,8 +107,12 @@ class Needs(NamedTuple):
 
 def necessary(site: Site, depart_speed: float | None = None) -> Needs:
     """The needs of a site's vehicles, by kind: the movements of each type in turn."""
-    alike = replace(site, seed=0, demand=(0.0,) * site.intersection.n, inflow=None)
-    return _necessary(alike, depart_speed)
+    return _necessary(alike(site), depart_speed)
+
+
+def alike(site: Site) -> Site:
+    """The same site with no demand and no seed, on which nothing here depends."""
+    return replace(site, seed=0, demand=(0.0,) * site.intersection.n, inflow=None)
 
 
 @lru_cache(maxsize=64)

@@ -73,11 +73,13 @@ def check(scenario: Scenario, controller: Controller, seed: int = 0) -> None:
 
 
 @given(bursts(), st.sampled_from(SAFE))
+@share(0.4)
 def test_no_controller_has_less_delay_than_the_bound(scenario: Scenario, name: str) -> None:
     check(scenario, controller_named(name))
 
 
 @given(bursts(lanes=1), st.integers(0, 10**6), st.sampled_from([0.0, 0.02, 0.2]))
+@share(0.4)
 def test_nor_has_one_lane_whatever_its_vehicles_are_told(
     scenario: Scenario, seed: int, often: float
 ) -> None:
@@ -85,7 +87,7 @@ def test_nor_has_one_lane_whatever_its_vehicles_are_told(
 
 
 @given(bursts())
-@share(0.5)
+@share(0.2)
 def test_the_schedule_can_be_driven(scenario: Scenario) -> None:
     check(scenario, optimum(scenario).schedule)
 
