@@ -94,7 +94,7 @@ def test_the_schedule_can_be_driven(scenario: Scenario) -> None:
 
 @pytest.mark.slow
 @given(scenarios(max_arms=5), st.sampled_from(SAFE), st.integers(0, 9))
-@share(0.2)
+@share(0.06)
 def test_the_bound_holds_on_any_junction(scenario: Scenario, name: str, seed: int) -> None:
     check(scenario, controller_named(name), seed)
     check(scenario, optimum(scenario, seed).schedule, seed)

@@ -11,7 +11,7 @@ from scenarios.profiles import FAIR, PAPER, Profile
 
 @pytest.mark.parametrize("profile", [FAIR, PAPER], ids=lambda it: it.name)
 def test_no_controller_has_less_delay_than_the_bound(profile: Profile) -> None:
-    scenario = four_way(profile=profile, density=250.0, horizon=120.0)
+    scenario = four_way(profile=profile, density=250.0, horizon=60.0)
     least = optimum(scenario)
     rows = list(compared(scenario, [Reservation(), V2IC()], 0, least, simulate))
     assert [row["error"] for row in rows] == ["", "", ""]
