@@ -99,7 +99,8 @@ def optimum(scenario: Scenario, seed: int = 0) -> Optimum:
     needs = necessary(site, scenario.depart_speed)
     plan = drivable(site, BUFFER, scenario.depart_speed)
     least = scheduled(_queue(enters[order], arrivals.lane[order], kind[order], needs), needs.rules)
-    best = scheduled(_queue(enters[order], arrivals.lane[order], kind[order], plan), plan.rules)
+    own = _queue(enters[order], arrivals.lane[order], kind[order], plan)
+    best = scheduled(own, plan.rules, exact=False)
     rank = ranks(arrivals.lane)[order]
     turns = tuple(
         Turn(int(arrivals.lane[order[i]]), int(rank[i]), int(kind[order[i]]), float(best.time[i]))

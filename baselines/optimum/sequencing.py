@@ -20,6 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.prediction import Floats
+from minisim.errors import InputError
 from minisim.jit import allocating, njit_inline
 from minisim.junction.movements import Bools, Ints
 
@@ -29,6 +30,9 @@ ROUNDING = 1e-9
 #: Of schedules with the same sum of arrivals, the one with the least sum of times is best; the sum
 #: of times counts so much less.
 TIE = 1e-6
+
+#: The most states at once that are looked at: some seconds for each further vehicle.
+MOST = 10_000
 
 #: Spacing of the tables of `Rules.wake` [s].
 WAKE_STEP = 0.05
@@ -79,8 +83,12 @@ def timed(queue: Queue, rules: Rules, order: Ints) -> tuple[Floats, Floats]:
     return time, arrival
 
 
-def scheduled(queue: Queue, rules: Rules) -> Schedule:
-    """The order in which vehicles arrive earliest in sum."""
+def scheduled(queue: Queue, rules: Rules, exact: bool = True) -> Schedule:
+    """The order in which vehicles arrive earliest in sum.
+
+    With more than `MOST` states at once, `InputError` if it has to be `exact`. Otherwise only the
+    cheapest states go on, and the order may not be the best; `bound` only holds if it is exact.
+    """
     k, starts = len(queue.kind), queue.begins[:-1]
     due, lanes = _due(queue, len(rules.rest)), np.arange(len(starts))
     at, cost = starts[None].copy(), np.zeros(1)
@@ -91,6 +99,13 @@ def scheduled(queue: Queue, rules: Rules) -> Schedule:
     for _ in range(k):
         at, free, ahead, cost, parent, lane = _next(queue, rules, due, at, free, ahead, cost)
         kept = _undominated(rules, at, free, ahead, cost)
+        if len(kept) > MOST:
+            if exact:
+                raise InputError(
+                    f"the best order of these {k} vehicles would take too long: more than {MOST} "
+                    "states at once; less demand or a shorter horizon helps"
+                )
+            kept = kept[np.argsort(cost[kept], kind="stable")[:MOST]]
         at, free, ahead, cost = at[kept], free[kept], ahead[kept], cost[kept]
         steps.append((parent[kept], lane[kept]))
         widest = max(widest, len(kept))

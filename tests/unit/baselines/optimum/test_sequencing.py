@@ -4,8 +4,10 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from baselines.optimum import sequencing
 from baselines.optimum.sequencing import WAKE_STEP, Queue, Rules, scheduled, timed
 from baselines.prediction import Floats
+from minisim.errors import InputError
 
 #: No exit lane costs anything.
 NO_WAKE = np.zeros((2, 2))
@@ -89,6 +91,22 @@ def test_a_vehicle_may_wait_so_that_two_need_not() -> None:
     made = scheduled(queue, plain(np.array([[1.0, 9.0], [1.0, 1.0]])))
     assert made.order.tolist() == [1, 2, 0]
     assert made.time.tolist() == [2.1, 0.1, 1.1]
+
+
+def test_too_many_states_are_refused_unless_the_order_need_not_be_the_best(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    queue, rules = max(
+        (random_case(np.random.default_rng(seed)) for seed in range(20)),
+        key=lambda case: scheduled(*case).widest,
+    )
+    best = scheduled(queue, rules)
+    monkeypatch.setattr(sequencing, "MOST", 1)
+    with pytest.raises(InputError, match="would take too long: more than 1 states"):
+        scheduled(queue, rules)
+    rough = scheduled(queue, rules, exact=False)
+    assert rough.widest == 1 < best.widest
+    assert rough.arrival.sum() >= best.arrival.sum()
 
 
 def test_without_vehicles_there_is_nothing_to_order() -> None:
