@@ -21,6 +21,7 @@ from minisim.junction.geometry import Intersection
 from minisim.junction.movements import ARM_NAMES
 from minisim.junction.paths import Way
 from minisim.junction.roads import Road
+from minisim.recorded import read_arrivals
 from minisim.shares import Turns
 from minisim.vehicle import VehicleType
 from scenarios.junctions import is_junction_file, junction_from
@@ -206,6 +207,19 @@ def _in_vehicles(scenario: Scenario, unit: str) -> Scenario:
     split = demand.split if len(set(means)) == 1 else tuple(rates)
     density = sum(rates) / len(scenario.intersection.approaches)
     return replace(scenario, demand=replace(demand, density=density, split=split))
+
+
+def replayed(scenario: Scenario, path: AnyPath, start: float | str | None = None) -> Scenario:
+    """The scenario, with the arrivals of a file in place of its demand.
+
+    `start` is as in `minisim.recorded.read_arrivals`. Raises what that raises, and `InputError` for
+    arrivals that the scenario cannot replay; every message names the file.
+    """
+    arrivals = read_arrivals(path, scenario.intersection.n, start or 0.0)
+    try:
+        return replace(scenario, recorded=arrivals)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
 
 
 def refuse_beside(whole: str, others: Iterable[str]) -> None:

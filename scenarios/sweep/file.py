@@ -50,11 +50,10 @@ from minisim.errors import (
 )
 from minisim.files import read_file
 from minisim.inflow import MAX_TIME
-from minisim.recorded import read_arrivals
 from scenarios.controllers import controller_named
 from scenarios.defaults import AXES, CUSTOM, SINGLE
 from scenarios.junctions import is_junction_file
-from scenarios.library import DRAWN, refuse_beside, scenario_named
+from scenarios.library import DRAWN, refuse_beside, replayed, scenario_named
 from scenarios.loading import metrics_named
 from scenarios.recipe import Recipe
 from scenarios.scenario import Scenario
@@ -184,8 +183,8 @@ def _scenario(chosen: dict[str, Any], folder: Path) -> Scenario:
     made = scenario_named(**junction, **chosen)
     if recorded is not None:
         instance("arrivals", recorded, str)
-        recorded = read_arrivals(folder / recorded, made.intersection.n, start or 0.0)
-    return replace(made, recorded=recorded, name=label or made.name)
+        made = replayed(made, folder / recorded, start)
+    return replace(made, name=label or made.name)
 
 
 def _table(given: object) -> dict[str, Any]:

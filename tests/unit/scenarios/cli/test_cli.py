@@ -371,6 +371,8 @@ def test_a_run_begins_at_a_time_of_day(capsys: Captured, tmp_path: Path) -> None
     morning.write_text("demand_time_s,lane,manoeuvre\n25205,a,2\n25207,b,1\n28900,c,3\n")
     run = ("run", "four-way", "--arrivals", str(morning), "--no-safety")
     assert "the first recorded arrival is at 25205 s (07:00:05)" in fails(capsys, *run)
+    late = fails(capsys, *run, "--start", "07:00", "--horizon", "3")
+    assert "first recorded arrival is at 25205 s (07:00:05)" in late
     for start, trips in (("07:00", 2), ("25205", 2), ("8:00", 1), ("7:00:06", 1)):
         assert answer(capsys, *run, "--start", start)["trips"] == trips
     assert "start must be a time of day" in fails(capsys, *run, "--start", "7h")
