@@ -45,16 +45,17 @@ def _html_row(name: str, means: Mapping[str, Any]) -> str:
 
 
 def _what(summary: Mapping[str, Any]) -> str:
-    short = {name: _short(summary[name]) for name in ("scenario", "controller", "profile")}
+    short = {name: _short(summary[name]) for name in ("scenario", "controller", "profile", "fleet")}
     return "{scenario}, {controller}: ".format_map(short) + conditions({**summary, **short})
 
 
-def conditions(summary: Mapping[str, Any]) -> str:
-    """Under which conditions a controller ran."""
+def conditions(summary: Mapping[str, Any], asked: str = "") -> str:
+    """Under which conditions a controller ran; `asked` is the inflow in another unit."""
     warmup = f" (warm-up {summary['warmup_s']:g} s)" if summary["warmup_s"] else ""
     host = "" if summary["host"] == "minisim" else f", host {summary['host']}"
     return (
-        f"{summary['density']:g} veh/h/lane, profile {summary['profile']}, "
+        f"{summary['density']:g} veh/h/lane{f' ({asked})' * bool(asked)}, "
+        f"profile {summary['profile']}, fleet {summary['fleet']}, "
         f"seed {summary['seed']}, {summary['horizon_s']:g} s{warmup}{host}"
     )
 

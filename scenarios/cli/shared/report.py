@@ -37,11 +37,15 @@ APART = ("side", "fleet", "turns", "horizon_s", "warmup_s")
 
 
 def run_parts(
-    summary: Mapping[str, Any], metrics: Sequence[Metric], by: str, counts: Mapping[str, float]
-) -> Iterator[Text | Table]:
-    """What was run, its table, the `dim.senses.tally` counts, and metrics of the whole run."""
+    summary: Mapping[str, Any], metrics: Sequence[Metric], by: str, counts: Mapping[str, float],
+    inflow: str = "",
+) -> Iterator[Text | Table]:  # fmt: skip
+    """What was run, its table, the `dim.senses.tally` counts, and metrics of the whole run.
+
+    `inflow` says the inflow in the unit in which it was given, if that is not veh/h/lane.
+    """
     what = f"{summary['scenario']}, {summary['controller']}"
-    yield Text.assemble((what, "bold"), f": {conditions(summary)}")
+    yield Text.assemble((what, "bold"), f": {conditions(summary, inflow)}")
     yield _run_table(summary, metrics, by)
     if told := spilled(summary):
         yield Text(f"  {told}", "yellow")

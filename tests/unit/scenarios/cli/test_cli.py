@@ -813,3 +813,14 @@ def test_counts_says_what_it_understood_and_saves_a_demand(
     assert "the junction has 4" in fails(capsys, "run", "four-way", "--demand", str(day))
     sheet.write_text(sheet.read_text().replace("7:15,N,L", "7:15,N,X"))
     assert "unknown turn 'X'" in fails(capsys, "counts", str(sheet))
+
+
+def test_the_head_of_a_run_has_its_fleet_and_the_unit_of_its_inflow(capsys: Captured) -> None:
+    run = "run four-way --fleet motorcycle:0.5,car:0.5 --no-safety --horizon 20 -d 175"
+    assert ": 175 veh/h/lane, profile paper, fleet motorcycle:0.5,car:0.5, seed 0" in ok(
+        capsys, *run.split()
+    )
+    # A motorcycle counts 0.75: 175 units are 200 vehicles.
+    assert ": 200 veh/h/lane (175 pcu/h/lane), profile paper, fleet" in ok(
+        capsys, *run.split(), "--unit", "pcu"
+    )
