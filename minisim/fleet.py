@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from minisim.errors import InputError, choice, instance, number, show
+from minisim.errors import InputError, choice, instance, number, plural, show
 from minisim.junction.movements import ARM_NAMES
 from minisim.parameters import Takes, checked, declared
 from minisim.streams import Draws
@@ -164,7 +164,10 @@ class Fleet:
 
     def __post_init__(self) -> None:
         if len(self.shares) != len(self.types):
-            raise InputError(f"{len(self.types)} types need as many shares, got {self.shares}")
+            raise InputError(
+                f"a fleet needs a share per type: it has {plural(len(self.types), 'type')}, got "
+                f"{self.shares}"
+            )
         counts = {len(row) for row in self.shares}
         if len(counts - {1}) > 1:
             raise InputError(f"shares by lane need a number per lane, got {self.shares}")

@@ -18,7 +18,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from minisim.errors import InputError, instance, items, number, numbers
+from minisim.errors import InputError, instance, items, number, numbers, plural
 from minisim.fields import Takes
 from minisim.junction.movements import ARM_NAMES, Bools, Movement, Movements, movements_of
 from minisim.junction.paths import Bundle, Path, Way
@@ -50,7 +50,7 @@ def _bearings(name: str, value: Any) -> tuple[float, ...]:
     bearings = numbers(name.removesuffix(" [deg]"), value)
     n, most = len(bearings), len(ARM_NAMES)
     if not 3 <= n <= most:
-        raise InputError(f"an intersection has 3 … {most} arms, got {n} bearings")
+        raise InputError(f"an intersection has 3 … {most} arms, got {plural(n, 'bearing')}")
     for i, bearing in enumerate(bearings):
         number(f"bearing {i + 1} [deg]", bearing, low=0, below=360)
     if list(bearings) != sorted(bearings):

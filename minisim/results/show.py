@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from html import escape
 from typing import TYPE_CHECKING, Any
 
+from minisim.errors import plural
 from minisim.results.metrics import MEANS, METRICS
 
 if TYPE_CHECKING:
@@ -68,7 +69,8 @@ def spilled(summary: Mapping[str, Any]) -> str:
 
 
 def _trips(summary: Mapping[str, Any]) -> str:
-    return "{trips} trips, {unfinished} unfinished, {collisions} collisions".format_map(summary)
+    trips, collisions = plural(summary["trips"], "trip"), plural(summary["collisions"], "collision")
+    return f"{trips}, {summary['unfinished']} unfinished, {collisions}"
 
 
 def _number(value: float | None) -> str:

@@ -12,6 +12,7 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
+from minisim.errors import plural
 from minisim.files import check_file
 from minisim.junction.conflicts import CLEARANCE
 from minisim.junction.movements import ARM_NAMES
@@ -102,8 +103,7 @@ def analysis_text(analysis: Analysis) -> Text:
         f"(no graph of {analysis.n} nodes has more than {most_cliques(analysis.n)})",
     )  # fmt: skip
     for size, (first, count) in analysis.worst.items():
-        cases = "1 case" if count == 1 else f"{count} cases"
-        text.append(f"\n{'':29}of size {size}: {cases}, such as {_spaced(first)}")
+        text.append(f"\n{'':29}of size {size}: {plural(count, 'case')}, such as {_spaced(first)}")
     return text
 
 
@@ -122,7 +122,9 @@ def protocol_text(name: str, search: Exploration, lassos: Sequence[Lasso | None]
     text.append("\nsafe         ", "dim")
     if search.unsafe:
         first = search.unsafe[0]
-        paths = f"\n{'':13}({len(search.unsafe)} such paths of {len(first)} events)"
+        paths = (
+            f"\n{'':13}({plural(len(search.unsafe), 'such path')} of {plural(len(first), 'event')})"
+        )
         text.append(*no).append(f": {_listed(first)}{paths}")
     else:
         text.append(*yes).append(": movements in conflict are never inside at once")

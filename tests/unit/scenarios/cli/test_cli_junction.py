@@ -41,8 +41,9 @@ def test_all_nodes_are_listed_with_their_verdicts(
 ) -> None:
     assert main(["junction", town, "--list"]) == 0
     told = capsys.readouterr().out
-    assert "1 arm for cars; 3 are needed" in told
-    assert "1 of 4 nodes can be read; 1 have 3 or more arms with one lane per direction" in told
+    assert "no   n, priority, 1 arm: 1 arm for cars; 3 are needed" in told
+    assert max(map(len, told.splitlines())) <= 80
+    assert "1 of 4 nodes can be read; 1 has 3 or more arms with one lane per direction" in told
     assert main(["junction", town, "--list", "--json"]) == 0
     rows = {row["node"]: row for row in json.loads(capsys.readouterr().out)}
     assert [name for name, row in rows.items() if row["readable"]] == ["C"]
