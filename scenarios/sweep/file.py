@@ -50,7 +50,8 @@ from minisim.errors import (
 )
 from minisim.files import read_file
 from minisim.inflow import MAX_TIME
-from scenarios.controllers import controller_named
+from minisim.parameters import parameters
+from scenarios.controllers import CONTROLLERS, controller_named
 from scenarios.defaults import AXES, CUSTOM, SINGLE
 from scenarios.junctions import is_junction_file
 from scenarios.library import DRAWN, refuse_beside, replayed, scenario_named
@@ -218,8 +219,23 @@ def _seeds(value: object) -> list[int]:
 
 
 def _check_keys(what: str, table: Iterable[str], known: Iterable[str]) -> None:
+    """Raise `InputError` for an unknown key; it says where one belongs that is known elsewhere."""
     for key in table:
+        if key not in known and (home := _home(key)):
+            raise InputError(f"unknown {what} {key!r}; {home}")
         choice(what, key, known)
+
+
+def _home(key: str) -> str:
+    """Where in a file a key belongs; empty if nowhere."""
+    if key in (*AXES, *SINGLE):
+        return f"it belongs on a line of its own: {key} = …"
+    if key in JUNCTION:
+        return f'it belongs to the scenario: scenario = {{ name = "four-way", {key} = … }}'
+    for name, entry in CONTROLLERS.items():
+        if any(it.name == key for it in parameters(entry.make)):
+            return f'it belongs to a controller: controller = {{ name = "{name}", {key} = … }}'
+    return ""
 
 
 def _check_names(recipes: Iterable[Recipe]) -> None:

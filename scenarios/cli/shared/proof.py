@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from itertools import compress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -145,24 +145,27 @@ def protocol_text(name: str, search: Exploration, lassos: Sequence[Lasso | None]
     return text
 
 
-def harmony_table(matrix: HarmonyMatrix) -> Table:
-    """The matrix with one column per lane: ● harmony, · conflict."""
+def harmony_table(matrix: HarmonyMatrix, shut: Collection[str] = ()) -> Table:
+    """The matrix with one column per lane: ● harmony, · conflict, – a movement that is `shut`."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     table.add_column("")
     manoeuvres = range(1, matrix.n)
 
-    def mark(harmony: bool, manoeuvre: int) -> Text:
-        text = f"{'●' if harmony else '·':<{len(str(manoeuvre)) + 2}}"
-        return Text(text, style="green" if harmony else "dim")
+    def mark(sign: str, manoeuvre: int) -> Text:
+        return Text(f"{sign:<{len(str(manoeuvre)) + 2}}", "green" if sign == "●" else "dim")
 
     for lane in ARM_NAMES[: matrix.n]:
         table.add_column(" ".join(f"{lane}{j}" for j in manoeuvres), no_wrap=True)
-    for movement, values in zip(matrix.movements, matrix.values, strict=True):
-        cells = [Text(str(movement), style="bold")]
-        for first in range(0, len(values), matrix.n - 1):
-            part = values[first:].tolist()
-            cells.append(Text("").join(map(mark, part, manoeuvres)))
-        table.add_row(*cells, end_section=movement.manoeuvre == matrix.n - 1)
+    known = [str(movement) in shut for movement in matrix.movements]
+    for movement, values in zip(matrix.movements, matrix.values.tolist(), strict=True):
+        signs = [
+            "–" if str(movement) in shut or gone else "●" if harmony else "·"
+            for gone, harmony in zip(known, values, strict=True)
+        ]
+        parts = range(0, len(signs), matrix.n - 1)
+        cells = [Text("").join(map(mark, signs[first:], manoeuvres)) for first in parts]
+        row = Text(str(movement), style="bold"), *cells
+        table.add_row(*row, end_section=movement.manoeuvre == matrix.n - 1)
     return table
 
 

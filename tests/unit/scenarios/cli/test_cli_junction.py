@@ -80,7 +80,12 @@ def test_commands_about_rules_take_a_node_and_know_what_is_closed_there(
     assert main(["harmony", *at, "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["closed"] == ["a1"]
     assert main(["harmony", *at]) == 0
-    assert "no vehicle may take a1" in capsys.readouterr().out
+    told = capsys.readouterr().out
+    assert "● harmony, · conflict, – closed: no vehicle may take a1" in told
+    rows = {line.split()[0]: line.split()[1:] for line in told.splitlines() if line.strip()}
+    assert rows["a1"] == ["–"] * 6
+    assert rows["b1"][0] == "–"
+    assert "–" not in rows["b1"][1:]
     assert main(["verify", *at, "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert told["cases"] == sum(told["cases_by_vehicles_that_go"].values()) == 17
