@@ -226,6 +226,13 @@ class Intersection:
         """The same of the shortest approach lane [m]."""
         return min(self.lengths[arm] for arm in self.approaches) - self.junction_radius
 
+    def too_short(self, needed: str) -> str:
+        """What messages say of the shortest road with an approach lane: how long it must be."""
+        arm = min(self.approaches, key=self.lengths.__getitem__)
+        own = self.roads is not None and self.roads[arm].length is not None
+        what = f"length [m] of the road of arm {ARM_NAMES[arm]}" if own else "arm_length [m]"
+        return f"{what} must be {needed}, got {self.lengths[arm]:g}"
+
     def refuse_roads(self, what: str) -> None:
         """Raise `InputError` if the approach lanes are not equally long, as `what` needs."""
         if self.shortest_approach < self.approach_length:
