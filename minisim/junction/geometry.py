@@ -236,7 +236,10 @@ class Intersection:
     def refuse_roads(self, what: str) -> None:
         """Raise `InputError` if the approach lanes are not equally long, as `what` needs."""
         if self.shortest_approach < self.approach_length:
-            raise InputError(f"{what} counts metres from insertion: give all roads one length")
+            raise InputError(
+                f"{what} counts metres from insertion: give all roads one length, got "
+                f"{', '.join(f'{it:g}' for it in self.lengths)} m"
+            )
 
     def index(self, movement: Movement | str) -> int:
         """Position of a movement in `movements`; `InputError` if it does not exist."""

@@ -232,8 +232,9 @@ def _home(key: str) -> str:
         return f"it belongs on a line of its own: {key} = …"
     if key in JUNCTION:
         return f'it belongs to the scenario: scenario = {{ name = "four-way", {key} = … }}'
-    for name, entry in CONTROLLERS.items():
-        if any(it.name == key for it in parameters(entry.make)):
+    makers: dict[str, Any] = {name: entry.make for name, entry in CONTROLLERS.items()}
+    for name, make in makers.items():
+        if any(it.name == key for it in parameters(make)):
             return f'it belongs to a controller: controller = {{ name = "{name}", {key} = … }}'
     return ""
 
