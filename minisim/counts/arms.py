@@ -24,7 +24,11 @@ from minisim.junction.movements import ARM_NAMES
 def arms_of(
     records: Sequence[Record], given: Mapping[str, Any], place: str, notes: list[str]
 ) -> tuple[tuple[str, ...], dict[str, int]]:
-    """The arms in clockwise order, and the lane of each name."""
+    """The arms in clockwise order, and the index of the lane of each name in the sheet.
+
+    What is assumed goes into `notes`. Raises `FileError` for a misspelt point of the compass, and
+    for fewer than 3 arms or too many; and `InputError` for a mapping that lacks an arm.
+    """
     named = {it.approach for it in records} | {it.exit for it in records if it.exit}
     found = sorted(named, key=lambda name: [
         int(part) if part.isdecimal() else part for part in re.split(r"(\d+)", name)
@@ -81,7 +85,10 @@ def manoeuvres_of(
     records: Sequence[Record], index: Mapping[str, int], n: int, given: Mapping[str, Any],
     place: str,
 ) -> dict[tuple[str, str, str], int]:  # fmt: skip
-    """The manoeuvre of each approach with a turn or an exit; 0 is a U-turn."""
+    """The manoeuvre 1 … n−1 of each approach, turn and exit that `records` have; 0 is a U-turn.
+
+    Raises `FileError` for a turn that is unknown, or that does not say which exit with `n` arms.
+    """
     made: dict[tuple[str, str, str], int] = {}
     words: dict[tuple[str, str, str], str] = {}
     for it in records:

@@ -43,7 +43,7 @@ class Count:
 
     @cached_property
     def demand(self) -> DemandProfile:
-        """The rates and turns of every interval."""
+        """The rates [veh/h] and turns of every interval, and the fleet."""
         periods = []
         for (start, end), lanes in zip(pairwise(self.edges), self.vehicles.sum(3), strict=True):
             rates = tuple((lanes.sum(1) * 3600.0 / (end - start)).tolist())

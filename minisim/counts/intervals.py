@@ -17,7 +17,11 @@ DAY = 86_400
 def edges_of(
     records: Sequence[Record], given: Mapping[str, Any], place: str, notes: list[str]
 ) -> tuple[int, ...]:
-    """The edges of the intervals [s], one after the other; raises `FileError` for others."""
+    """The edges of the intervals, times of day [s], ascending; p + 1 of p intervals.
+
+    What is assumed goes into `notes`. Raises `FileError` for intervals that overlap, leave a hole
+    or cross midnight, and `InputError` for a length that a mapping gives beside ends.
+    """
     ends: dict[int, int | None] = {}
     for it in records:
         if ends.setdefault(it.start, it.end) != it.end:

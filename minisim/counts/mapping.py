@@ -50,7 +50,10 @@ def _is_turn(text: str) -> bool:
 def check_used(
     given: Mapping[str, Any], key: str, there: Collection[str], place: str, what: str
 ) -> None:
-    """Raise `InputError` for a word under a key of a mapping that is not `there` in the sheet."""
+    """Raise `InputError` for a word under a key of a mapping that is not `there` in the sheet.
+
+    `place` is the sheet, and `what` is what messages call such a word.
+    """
     for name in given.get(key, {}):
         if name not in there:
             known = f"it has {', '.join(sorted(there))}{nearest(name, there)}"

@@ -46,9 +46,10 @@ class _Layout(NamedTuple):
 
 
 def records_of(path: AnyPath, given: Mapping[str, Any], notes: list[str]) -> Iterator[Record]:
-    """Every count of a sheet; `given` is a mapping, and what was assumed goes into `notes`.
+    """Every count of a sheet; `given` is a mapping, and what is assumed goes into `notes`.
 
-    Raises `FileError` and `InputError` as `minisim.counts.read_counts`.
+    Once all are read, a mapping of words that none of them has is refused. Raises `FileError` and
+    `InputError` as `minisim.counts.read_counts`.
     """
     sheet = read_sheet(path, partial(_is_header, given))
     columns, streams, kinds = layout = _layout(sheet, given, f"{path}", notes)

@@ -143,7 +143,7 @@ def town_of(path: AnyPath, side: str | None = None) -> Town:
 
 
 def survey_node(town: Town, node: str) -> Survey:
-    """What the simulator makes of one node."""
+    """What the simulator makes of one node, which is one of `town.nodes`."""
     place, arms = town.nodes[node], arms_of(town, node)
     if len(arms) < 3:
         problem = f"{plural(len(arms), 'arm') if arms else 'no arms'} for cars; 3 are needed"
