@@ -184,7 +184,8 @@ def _saturated(studies: Iterable[Results]) -> str:
         "end. Their means depend on the horizon; they are not delays that a driver could expect."
     )
     if short:
-        lines.append(f"- The runs of {short} cells are too short: the roads were still filling.")
+        cells = plural(short, "cell")
+        lines.append(f"- The runs of {cells} are too short: the roads were still filling.")
     return f"{head}\n\n" + ("\n".join(lines) or "None.")
 
 

@@ -19,7 +19,7 @@ from minisim.counts.mapping import read_mapping
 from minisim.counts.records import Record, class_of, near_class, records_of
 from minisim.counts.words import LEFT_OUT, hint
 from minisim.demand import DemandProfile, Period
-from minisim.errors import FileError
+from minisim.errors import FileError, InputError
 from minisim.files import AnyPath
 from minisim.fleet import TYPES
 from minisim.inflow import Floats
@@ -93,10 +93,9 @@ def read_counts(path: AnyPath, mapping: AnyPath | Mapping[str, Any] | None = Non
     kinds, kept = _simulated(list(records_of(path, given, notes)), given, left)
     if not kept:
         why = ", ".join(f"{total:g} {what}" for what, total in left.items()) or "all rows"
-        raise FileError(
-            f"{place}: nothing is left to simulate; left out: {why}; a mapping says "
-            'what classes are, as in classes = { Kfz = "car" }'
-        )
+        told = f"{place}: nothing is left to simulate; left out: {why}"
+        help_ = '; a mapping can say what a class is, as in classes = { Kfz = "car" }'
+        raise FileError(told + help_ * bool(kinds))
     edges, (arms, index) = edges_of(kept, given, place, notes), arms_of(kept, given, place, notes)
     manoeuvres = manoeuvres_of(kept, index, len(arms), given, place)
     types = tuple(kind for kind in TYPES if kind in kinds.values())
@@ -128,6 +127,8 @@ def _simulated(
 ) -> tuple[dict[str, str], list[Record]]:
     """What each class of the sheet is, and the records of those that are simulated."""
     low, high = (seconds_of(given[key], key) if key in given else None for key in ("from", "until"))
+    if low is not None and high is not None and low >= high:
+        raise InputError(f"from must be before until, got {given['from']} and {given['until']}")
     kinds: dict[str, str] = {}
     kept = []
     for it in records:

@@ -61,7 +61,7 @@ def records_of(path: AnyPath, given: Mapping[str, Any], notes: list[str]) -> Ite
         where = f"{path}, line {line}"
         said = {key: cells[k] for key, k in columns.items() if k < len(cells)}
         if any(is_total(said.get(key, "")) for key in ("start", "approach", "turn", "exit")):
-            noticed["rows of totals, left out"].append(line)
+            noticed["rows of totals or shares, left out"].append(line)
             continue
         if len(cells) != len(sheet.header):
             raise FileError(f"{where}: {len(sheet.header)} cells are needed, got {len(cells)}")
@@ -170,6 +170,8 @@ def _columns(sheet: Sheet, given: Mapping[str, Any], place: str) -> dict[str, in
     for key, words in COLUMNS.items():
         if key in given:
             name = choice(f"column of {place} for {key}:", given[key], sheet.header)
+            if sheet.header.index(name) in found.values():
+                raise InputError(f"the mapping has the column {name!r} of {place} for two keys")
             found[key] = sheet.header.index(name)
             continue
         named = [(word, known[word]) for word in (plain(key), *words) if word in known]

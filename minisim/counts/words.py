@@ -46,7 +46,7 @@ CLASSES: Final[Mapping[str, tuple[str, ...]]] = {
 }  # fmt: skip
 
 _TOTAL: Final = re.compile(
-    r"(?<![^\W_])((grand|sub)?totals?|sums?|\w*summen?|gesamt|insgesamt)(?![^\W_])|[Σ∑]",
+    r"(?<![^\W_])((grand|sub)?totals?|sums?|\w*summen?|gesamt|insgesamt|percent|prozent)(?![^\W_])|[Σ∑%]",
     re.IGNORECASE,
 )
 
@@ -54,7 +54,7 @@ _TOTAL: Final = re.compile(
 LEFT_OUT: Final = {
     "bicycle": "bicycles are not simulated",
     "pedestrian": "pedestrians are not simulated",
-    "total": "a sum, not a class",
+    "total": "a sum or a share, not a class",
 }
 
 #: Turns, from left to right, and back -> the words of sheets for them.
@@ -87,7 +87,7 @@ def word_of(text: str, words: Mapping[str, Sequence[str]]) -> str | None:
 
 
 def is_total(text: str) -> bool:
-    """Whether a cell or the name of a column says that it holds a sum, such as "Summe Kfz"."""
+    """Whether a cell or a column's name says that it holds a sum or share, such as "Summe Kfz"."""
     return _TOTAL.search(text) is not None
 
 

@@ -22,6 +22,7 @@ WITH_SUMS = "\n".join([
     "06:00;06:30;Nord;Summe;180;6;186",
     "Gesamt;;;;720;24;744",
     "Summe;744",
+    "Anteil in %;;;;100;0;100",
 ])  # fmt: skip
 
 
@@ -31,8 +32,8 @@ def test_titles_and_sums_are_named_and_left_out(tmp_path: Path, encoding: str) -
     assert count.arms == ("N", "E", "S", "W")
     assert count.edges == (21_600, 22_500, 23_400)
     assert count.vehicles.sum() == 12 * (20 + 40 + 2)
-    assert count.left_out == {"Summe Kfz (a sum, not a class)": 12 * (21 + 41)}
-    assert "rows of totals, left out: 4, the first in line 29" in count.notes
+    assert count.left_out == {"Summe Kfz (a sum or a share, not a class)": 12 * (21 + 41)}
+    assert "rows of totals or shares, left out: 5, the first in line 29" in count.notes
     assert any(note.startswith("above the header, not used: Verkehrsz") for note in count.notes)
 
 
@@ -45,7 +46,7 @@ def test_sums_of_a_sheet_of_movements(tmp_path: Path) -> None:
     ])  # fmt: skip
     count = read_count(tmp_path, text)
     assert count.vehicles.sum() == 4 * (95 + 125)
-    assert "rows of totals, left out: 1, the first in line 5" in count.notes
+    assert "rows of totals or shares, left out: 1, the first in line 5" in count.notes
     assert "columns not used: Int. Total" in count.notes
 
 
