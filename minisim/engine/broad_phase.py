@@ -6,7 +6,7 @@ import math
 
 from minisim.engine.packed import AWAY, LENGTH, PATH, TYPE, S, count
 from minisim.engine.state import Floats, Ints, Layout, Records
-from minisim.jit import njit, njit_inline
+from minisim.jit import njit_inline, njit_inner
 from minisim.junction.paths import dragged, locate
 from minisim.laws import Law
 
@@ -17,7 +17,7 @@ TOUCH_MARGIN = 0.02
 place, drag = njit_inline(locate), njit_inline(dragged)
 
 
-@njit
+@njit_inner
 def may_touch(
     floats: Floats, ints: Ints, lanes: Records, road: Layout, law: Law, bodies: Floats
 ) -> bool:
@@ -75,7 +75,7 @@ def may_touch(
     return False
 
 
-@njit
+@njit_inner
 def rectangles_meet(
     dx: float, dy: float, ux: float, uy: float, wx: float, wy: float,
     u_length: float, u_width: float, w_length: float, w_width: float,

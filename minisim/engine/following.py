@@ -47,7 +47,7 @@ from minisim.engine.packed import (
     padded,
 )
 from minisim.engine.state import Floats, Ints, Layout, Records
-from minisim.jit import njit, njit_inline
+from minisim.jit import njit_inline, njit_inner
 from minisim.laws import (
     IDM,
     IIDM,
@@ -153,7 +153,7 @@ def near_junction(
     return overlap
 
 
-@njit
+@njit_inner
 def beyond(
     floats: Floats, ints: Ints, road: Layout, law: Law, first: int, stop: int, i: int
 ) -> float:

@@ -8,11 +8,11 @@ from minisim.engine.cruise.ends import blocked
 from minisim.engine.cruise.law import Cruise
 from minisim.engine.packed import B_MAX, LENGTH, S, V, admit
 from minisim.engine.state import DRIVING, Floats, Ints, Layout, Records
-from minisim.jit import njit
+from minisim.jit import njit_inner
 from minisim.laws import STOP_MARGIN, Law, insertable, room_behind
 
 
-@njit
+@njit_inner
 def insert(
     floats: Floats, ints: Ints, vehicles: Records, lanes: Records, road: Layout, law: Law,
     cruise: Cruise | None, tick: int,

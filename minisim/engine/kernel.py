@@ -29,7 +29,7 @@ from minisim.engine.packed import (
     store,
 )
 from minisim.engine.state import ARRIVED, Floats, Ints, Layout, Records
-from minisim.jit import njit, njit_inline
+from minisim.jit import njit, njit_inline, njit_inner
 from minisim.laws import Law
 
 #: Reasons to return, as bits, beside those to wake a session.
@@ -122,7 +122,7 @@ def step(
     return reasons | DONE if done else reasons
 
 
-@njit
+@njit_inner
 def occupied(floats: Floats, ints: Ints, lanes: Records, law: Law) -> bool:
     """Whether any vehicle is inside the junction, at least partly."""
     inside = False
@@ -131,7 +131,7 @@ def occupied(floats: Floats, ints: Ints, lanes: Records, law: Law) -> bool:
     return inside
 
 
-@njit
+@njit_inner
 def record(
     floats: Floats,
     ints: Ints,
@@ -156,7 +156,7 @@ def record(
     return traced
 
 
-@njit
+@njit_inner
 def observe(
     floats: Floats, ints: Ints, vehicles: Records, lanes: Records, law: Law, observed: Records
 ) -> int:

@@ -31,7 +31,7 @@ from minisim.engine.packed import (
     padded,
 )
 from minisim.engine.state import ARRIVED, Floats, Ints, Layout, Records
-from minisim.jit import njit, njit_inline
+from minisim.jit import njit_inline, njit_inner
 from minisim.laws import Law
 
 #: Reasons to wake a session, as bits.
@@ -87,7 +87,7 @@ def add_up(floats: Floats, n: int) -> None:
         lost[i] += 1.0 - ratio[i] if v[i] < top[i] else 0.0
 
 
-@njit
+@njit_inner
 def happenings(
     floats: Floats, ints: Ints, vehicles: Records, lanes: Records, road: Layout, law: Law, n: int,
     tick: int,
@@ -130,7 +130,7 @@ def happenings(
     return reasons
 
 
-@njit
+@njit_inner
 def catch_up(vehicles: Records, lanes: Records) -> None:
     """Note which row of each lane is the first not yet arrived."""
     for lane in range(len(lanes)):

@@ -16,7 +16,7 @@ import math
 import numpy as np
 
 from minisim.engine.state import Floats, Ints, Layout, Records
-from minisim.jit import njit, njit_inline
+from minisim.jit import njit, njit_inline, njit_inner
 from minisim.laws import STOP_MARGIN, Law
 
 #: Rows of the array of floats, as in `minisim.engine.state.VEHICLE` and `minisim.laws.Traits`.
@@ -68,7 +68,7 @@ def padded(n: int) -> int:
     return (n + 7) // 8 * 8
 
 
-@njit
+@njit_inner
 def admit(
     floats: Floats, ints: Ints, vehicles: Records, lanes: Records, road: Layout, law: Law, i: int
 ) -> None:
@@ -99,7 +99,7 @@ def admit(
     expect(floats, ints, road, law, at)
 
 
-@njit
+@njit_inner
 def shift(floats: Floats, ints: Ints, lanes: Records, lane: int, at: int, by: int) -> None:
     """Make room for a slot on a lane (`by` 1), or close the gap that one leaves (`by` -1)."""
     n = count(lanes)
@@ -134,7 +134,7 @@ def shifted(slot: int, at: int, by: int) -> int:
     return -1 if by < 0 and slot == at else slot + by
 
 
-@njit
+@njit_inner
 def dismiss(floats: Floats, ints: Ints, vehicles: Records, lanes: Records, at: int) -> None:
     """Take the vehicle in a slot off the road."""
     keep(floats, ints, vehicles, at)
@@ -158,7 +158,7 @@ def keep(floats: Floats, ints: Ints, vehicles: Records, i: int) -> None:
     me["waiting_ticks"], me["lost_ticks"] = int(floats[WAITED, i]), floats[LOST, i]
 
 
-@njit
+@njit_inner
 def heed(
     floats: Floats, ints: Ints, vehicles: Records, lanes: Records, road: Layout, law: Law
 ) -> bool:
@@ -187,7 +187,7 @@ def beware(floats: Floats, ints: Ints, vehicles: Records, road: Layout, law: Law
     floats[CARE, i] = care if vehicles[ints[ROW, i]]["advice"] == math.inf else -math.inf
 
 
-@njit
+@njit_inner
 def expect(floats: Floats, ints: Ints, road: Layout, law: Law, i: int) -> None:
     """Note the next `s` at which something happens."""
     p = ints[PATH, i]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from minisim.carfollowing import braking_distance
 from minisim.engine.cruise.law import Cruise
 from minisim.engine.state import ARRIVED, DRIVING, Layout, Records
-from minisim.jit import njit
+from minisim.jit import njit_inner
 from minisim.laws import PAST_THE_END, Law
 
 #: Length of the turnarounds at the far ends of the published roads [m].
@@ -18,7 +18,7 @@ REACTION = 1.0
 TOLERANCE = 0.001
 
 
-@njit
+@njit_inner
 def blocked(vehicles: Records, road: Layout, law: Law, cruise: Cruise, arm: int) -> bool:
     """Whether a vehicle arriving on an arm keeps others from being inserted there.
 
@@ -36,7 +36,7 @@ def blocked(vehicles: Records, road: Layout, law: Law, cruise: Cruise, arm: int)
     return bool(rest + TURNAROUND + law.margin - cruise.type.min_gap < needed)
 
 
-@njit
+@njit_inner
 def look(
     vehicles: Records, lanes: Records, road: Layout, law: Law, cruise: Cruise, tick: int
 ) -> bool:
@@ -69,7 +69,7 @@ def look(
     return lost
 
 
-@njit
+@njit_inner
 def teleport(vehicles: Records, road: Layout, cruise: Cruise, i: int, tick: int) -> bool:
     """Remove a vehicle that has run into the one ahead on its exit; return whether it has.
 

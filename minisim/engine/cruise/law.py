@@ -10,7 +10,7 @@ import numpy as np
 from minisim.carfollowing import STANDSTILL, distance_control, engine_lag, safe_speed
 from minisim.control import Site
 from minisim.engine.state import Floats, Ints, Layout, Records
-from minisim.jit import njit, njit_inline
+from minisim.jit import njit_inline, njit_inner
 from minisim.junction.geometry import Intersection
 from minisim.junction.meetings import Bools, meetings, right_of_way, sagittas
 from minisim.laws import KRAUSS, Law, Traits, traits_of
@@ -148,7 +148,7 @@ def follow(v: float, gap: float, v_leader: float, law: Law, cruise: Cruise) -> f
     return distance_control(v, gap, v_leader, cruise.headway, cruise.spacing_gain, cruise.spacing)
 
 
-@njit
+@njit_inner
 def allowed(s: float, v: float, p: int, v0: float, road: Layout, law: Law, cruise: Cruise) -> float:
     """The speed that a vehicle which obeys limits may drive [m/s].
 

@@ -10,7 +10,7 @@ from minisim.carfollowing import STANDSTILL, braking_distance, cruise_control
 from minisim.engine.cruise.law import FASTEST, Cruise, allowed, follow, realise
 from minisim.engine.cruise.radar import Ahead, gather, meet
 from minisim.engine.state import AMBER, DRIVING, Layout, Records
-from minisim.jit import njit
+from minisim.jit import njit_inner
 from minisim.laws import (
     KRAUSS,
     STOP_LINE_GAP,
@@ -27,7 +27,7 @@ from minisim.laws import (
 from minisim.vehicle import POSITION_EPS
 
 
-@njit
+@njit_inner
 def accelerate(vehicles: Records, lanes: Records, road: Layout, law: Law, cruise: Cruise) -> bool:
     """Choose every vehicle's acceleration from the present state; returns whether two overlap.
 
@@ -130,7 +130,7 @@ def accelerate(vehicles: Records, lanes: Records, road: Layout, law: Law, cruise
     return overlap
 
 
-@njit
+@njit_inner
 def free(me: np.void, road: Layout, law: Law, cruise: Cruise) -> float:
     """The acceleration of a vehicle that nothing hinders, within the limits here and ahead."""
     s, v, p, section, factor = me["s"], me["v"], me["path"], me["section"], me["factor"]
