@@ -37,8 +37,6 @@ def pcu_factors(fleet: Fleet, unit: str, n: int) -> tuple[float, ...]:
     """
     table = UNITS[choice("passenger car unit", unit, UNITS)]
     shares = np.mean([fleet.of_lane(lane) for lane in range(n)], axis=0)
-    if len(fleet.types) == 1:  # the unit is defined by cars alone
-        return (1.0,)
     plain = [name.removesuffix(OFFTRACKING) for name in fleet.names]
     kinds = [ALIKE.get(name, name) for name in plain]
     rows = [table[choice(f"vehicle type in {unit}", kind, table)] for kind in kinds]

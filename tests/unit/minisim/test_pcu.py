@@ -20,7 +20,7 @@ def test_the_units_of_irc_106_depend_on_the_share() -> None:
         for share in (0.02, 0.05, 0.075, 0.1, 0.7)
     ]
     assert factors == pytest.approx([0.5, 0.5, 0.625, 0.75, 0.75])
-    assert pcu_factors(fleet_named("motorcycle", CAR), "pcu", 4) == (1.0,)
+    assert pcu_factors(fleet_named("motorcycle", CAR), "pcu", 4) == (0.75,)
     with pytest.raises(InputError, match="vehicle type in pcu-hcm"):
         pcu_factors(fleet_named("india", CAR), "pcu-hcm", 4)
     for unit, table in UNITS.items():
