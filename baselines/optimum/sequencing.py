@@ -31,8 +31,7 @@ ROUNDING = 1e-9
 #: of times counts so much less.
 TIE = 1e-6
 
-#: The most states at once. Hours below saturation have some tens; with so many, each further vehicle
-#: takes about a second.
+#: The most states at once. Hours below saturation have some tens.
 MOST = 2_000
 
 #: Spacing of the tables of `Rules.wake` [s].
