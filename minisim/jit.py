@@ -94,17 +94,39 @@ def _compile(function: _F, **options: bool) -> _F:
 @lru_cache
 def _cache_class() -> Any:
     import numba
-    from numba.core.caching import FunctionCache
+    from numba.core.caching import FunctionCache, IndexDataCacheFile
+
+    class Files(IndexDataCacheFile):
+        """An index, and the code for each signature, which several processes may write at once.
+
+        numba numbers the codes, and writes the index first: who reads meanwhile gets the code of
+        older sources, or of another signature.
+        """
+
+        def save(self, key: Any, data: Any) -> None:
+            """Write the code, under a name that no other code has, then the index."""
+            kept = self._load_index()  # type: ignore[no-untyped-call]  # numba has no types
+            if not kept:
+                self._remove_old()
+            digest = hashlib.sha256(repr((self._source_stamp, key)).encode()).digest()
+            name = self._data_name(int.from_bytes(digest[:8]))  # type: ignore[no-untyped-call]
+            self._save_data(name, data)  # type: ignore[no-untyped-call]
+            self._save_index({**kept, key: name})  # type: ignore[no-untyped-call]
+
+        def _remove_old(self) -> None:
+            for old in Path(self._cache_path).glob(f"{Path(self._index_name).stem}.*.nbc"):
+                old.unlink(missing_ok=True)
 
     class SourcesCache(FunctionCache):
         """numba's cache on disk, valid only as long as none of our sources changes."""
 
         def __init__(self, function: Callable[..., object]) -> None:
-            super().__init__(function)  # type: ignore[no-untyped-call]  # numba has no types
+            super().__init__(function)  # type: ignore[no-untyped-call]  # as above
             folder = Path(inspect.getfile(function)).parent
             sources = numba.__version__, _digest(folder), _digest(Path(__file__).parent)
-            # If the version differs, numba does not read the rest, whose classes may be gone.
-            self._cache_file._version = self._cache_file._source_stamp = sources
+            files = Files(self._cache_path, self._impl.filename_base, sources)  # type: ignore[no-untyped-call]
+            files._version = sources  # where it differs, numba does not read classes that are gone
+            self._cache_file = files
 
         def load_overload(self, sig: Any, target_context: Any) -> Any:
             """The code on disk; None if there is none, and it has to be compiled."""
