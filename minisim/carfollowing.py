@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from minisim.jit import njit, njit_inline
+from minisim.jit import njit_inline, njit_inner
 
 #: A vehicle with less than this to go has arrived [m]: an approach that gets slower as the distance
 #: shrinks would never end (SUMO's `NUMERICAL_EPS`, in the same place).
@@ -77,7 +77,7 @@ def iidm(v: float, v0: float, z: float, a: float, b: float, delta: float) -> flo
     return acc_free * float(1.0 - z ** (2.0 * a / acc_free))
 
 
-@njit
+@njit_inner
 def safe_speed(gap: float, v_leader: float, b: float, headway: float, dt: float) -> float:
     """Krauß's safe speed: the highest at which a leader that brakes at b causes no collision.
 
@@ -98,7 +98,7 @@ def safe_speed(gap: float, v_leader: float, b: float, headway: float, dt: float)
     return steps * b * dt + rest / (headway + steps * dt)
 
 
-@njit
+@njit_inner
 def braking_distance(v: float, b: float, dt: float) -> float:
     """Distance to standstill when each step, including this one, is b·dt slower than the last [m].
 
@@ -108,7 +108,7 @@ def braking_distance(v: float, b: float, dt: float) -> float:
     return dt * steps * (v - 0.5 * b * dt * (steps + 1.0))
 
 
-@njit
+@njit_inner
 def stepwise_towards(v_target: float, distance: float, b: float, dt: float) -> float:
     """`speed_towards` for `semi_implicit`: the highest next speed that still allows `v_target`.
 
@@ -125,7 +125,7 @@ def stepwise_towards(v_target: float, distance: float, b: float, dt: float) -> f
     return v_target + steps * b * dt + rest / ((steps + 1.0) * dt)
 
 
-@njit
+@njit_inner
 def krauss(v: float, v0: float, v_safe: float, a: float, b: float, dt: float) -> float:
     """Next speed [m/s]: the lowest of the desired, attainable and safe speeds.
 
@@ -151,7 +151,7 @@ def speed_towards(v: float, v_target: float, distance: float, b: float, dt: floa
     return math.sqrt(disc) - half
 
 
-@njit
+@njit_inner
 def stop_within(v: float, distance: float, b: float, dt: float) -> float:
     """Highest acceleration in a ballistic step after which braking at b stops within `distance`.
 
@@ -185,7 +185,7 @@ def semi_implicit(s: float, v: float, acc: float, dt: float) -> tuple[float, flo
     return s + v_new * dt, v_new
 
 
-@njit
+@njit_inner
 def insertion_speed(
     gap: float, v_leader: float, a: float, b: float, headway: float, min_gap: float
 ) -> float:

@@ -25,7 +25,7 @@ from minisim.carfollowing import (
 )
 from minisim.control import Plan, Site
 from minisim.fleet import Fleet
-from minisim.jit import njit, njit_inline
+from minisim.jit import njit_inline, njit_inner
 from minisim.junction.geometry import Intersection
 from minisim.junction.partings import turning_room
 from minisim.ticks import NEVER, first_tick
@@ -182,7 +182,7 @@ def short_of(room: float, v: float, v_new: float, me: Traits, law: Law) -> bool:
     return top * (top + 2.0 * me.b_max * law.dt) > room
 
 
-@njit
+@njit_inner
 def keep_room(v: float, room: float, me: Traits, law: Law) -> float:
     """Highest acceleration after which the brakes still stop a vehicle in this room [m/s²].
 
@@ -240,7 +240,7 @@ def within(v: float, acc: float, limit: float, law: Law) -> float:
     return (limit - v) / law.dt if v < limit < v + acc * law.dt else acc
 
 
-@njit
+@njit_inner
 def insertable(gap: float, v_leader: float, me: Traits, law: Law) -> float:
     """Highest speed at which this run's law allows insertion; negative when there is none.
 
@@ -274,7 +274,7 @@ def slow_down(v: float, acc: float, target: float, distance: float, me: Traits, 
     return max((v_new - v) / law.dt, -me.b)
 
 
-@njit
+@njit_inner
 def krauss_stop(v: float, room: float, me: Traits, law: Law) -> float:
     """The acceleration with which a vehicle may still stop in `room` [m] by Krauß's law.
 
@@ -309,7 +309,7 @@ def hold(v: float, s: float, me: Traits, law: Law) -> float:
     return -v * v / (2.0 * max(to_junction - STOP_MARGIN, 1e-6))
 
 
-@njit
+@njit_inner
 def stop_at_line(v: float, to_line: float, me: Traits, law: Law) -> float:
     """`hold` by SUMO's rule: a vehicle stops 1 m before a line, or nearer if it must.
 
@@ -321,7 +321,7 @@ def stop_at_line(v: float, to_line: float, me: Traits, law: Law) -> float:
     )
 
 
-@njit
+@njit_inner
 def hold_stepwise(v: float, to_line: float, to_entry: float, b: float, dt: float) -> float:
     """`hold` for `semi_implicit`; a function of its own to keep the inner loop short."""
     needed = braking_distance(v, b, dt)

@@ -10,7 +10,7 @@ import numpy as np
 from minisim.carfollowing import STANDSTILL, distance_control, engine_lag, safe_speed
 from minisim.control import Site
 from minisim.engine.state import Floats, Ints, Layout, Records
-from minisim.jit import njit, njit_inline
+from minisim.jit import njit_inline, njit_inner
 from minisim.junction.geometry import Intersection
 from minisim.junction.meetings import Bools, meetings, right_of_way, sagittas
 from minisim.laws import KRAUSS, Law, Traits, traits_of
@@ -148,8 +148,10 @@ def follow(v: float, gap: float, v_leader: float, law: Law, cruise: Cruise) -> f
     return distance_control(v, gap, v_leader, cruise.headway, cruise.spacing_gain, cruise.spacing)
 
 
-@njit
-def allowed(s: float, v: float, p: int, v0: float, road: Layout, law: Law, cruise: Cruise) -> float:
+@njit_inner
+def allowed(
+    s: float, v: float, p: int, v0: float, layout: Layout, law: Law, cruise: Cruise
+) -> float:
     """The speed that a vehicle which obeys limits may drive [m/s].
 
     It takes its desired speed for a factor on the limit where it was one step before. So a limit
@@ -157,10 +159,10 @@ def allowed(s: float, v: float, p: int, v0: float, road: Layout, law: Law, cruis
     Source: `MSCFModel_CC::finalizeSpeed`, `MSLane::getVehicleMaxSpeed`.
     """
     before = s - v * law.dt
-    limit, turn = road.section_speed[p, 0], road.section_speed[p, 1]
+    limit, turn = layout.section_speed[p, 0], layout.section_speed[p, 1]
     if before < law.entry <= s:
         return float(v0 * turn / limit)
-    if before < road.ends[p, 0] <= s:
+    if before < layout.ends[p, 0] <= s:
         return float(min(v0 * limit / turn, cruise.max_speed))
     return v0
 

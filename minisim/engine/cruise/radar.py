@@ -11,7 +11,7 @@ from minisim.carfollowing import braking_distance
 from minisim.control import HALTING
 from minisim.engine.cruise.law import Cruise, follow
 from minisim.engine.state import DRIVING, Floats, Ints, Records
-from minisim.jit import allocating, njit, njit_inline
+from minisim.jit import allocating, njit_inline, njit_inner
 from minisim.junction.meetings import Meeting
 from minisim.laws import KRAUSS, Law, krauss_stop
 from minisim.ticks import NEVER
@@ -57,7 +57,7 @@ def gather(vehicles: Records, lanes: Records, ends: Floats, law: Law, cruise: Cr
     return inside[:count]
 
 
-@njit
+@njit_inner
 def meet(
     vehicles: Records,
     ends: Floats,
@@ -126,7 +126,7 @@ def yields(vehicles: Records, cruise: Cruise, i: int, j: int, kind: int) -> bool
     return bool((kind == PART and not left) or (kind == JOIN and left and cruise.straightest[p]))
 
 
-@njit
+@njit_inner
 def radar(
     vehicles: Records,
     ends: Floats,

@@ -66,7 +66,7 @@ def write(folder: Path, *, decorator: str = "njit", factor: float = 0.5, body: s
     (folder / "outside" / "rule.py").write_text(text)
 
 
-@pytest.mark.parametrize("decorator", ["njit", "njit_inline"])
+@pytest.mark.parametrize("decorator", ["njit", "njit_inner", "njit_inline"])
 def test_a_change_of_what_is_called_is_seen(tmp_path: Path, decorator: str) -> None:
     tree = copied(tmp_path)
     write(tree, decorator=decorator)
@@ -79,6 +79,15 @@ def test_a_change_of_what_is_called_is_seen(tmp_path: Path, decorator: str) -> N
     # Controllers call functions of `minisim` from other folders.
     (tree / "minisim" / "other.py").write_text("SPEED = 1.0\n")
     assert ask(tree) == "20.25 compiled"
+
+
+def test_python_may_call_what_is_compiled_for_compiled_callers_only(tmp_path: Path) -> None:
+    tree = copied(tmp_path)
+    write(tree, decorator="njit_inner")
+    twice = (
+        ASK + "from outside.rule import rule\nprint(rule(3.0), rule(x=4.0), len(rule.signatures))"
+    )
+    assert ask(tree, twice).split("\n") == ["10.5 compiled", "3.0 4.0 1"]
 
 
 def test_looking_at_the_sources_is_quick() -> None:
