@@ -159,7 +159,9 @@ def _cache_class() -> Any:
 
         def load_overload(self, sig: Any, target_context: Any) -> Any:
             """The code on disk; None if there is none, and it has to be compiled."""
-            found = super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]  # as above
+            # numba's would first load what only its compiler needs, all of scipy.linalg included.
+            with self._guard_against_spurious_io_errors():  # type: ignore[no-untyped-call]  # as above
+                found = self._load_overload(sig, target_context)  # type: ignore[no-untyped-call]
             if found is None:
                 _announce()
             return found
