@@ -13,8 +13,10 @@ import hashlib
 import inspect
 import os
 import sys
+import warnings
 from collections.abc import Callable, Hashable, Sequence
 from functools import lru_cache
+from importlib import import_module
 from multiprocessing import parent_process
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -75,7 +77,7 @@ def direct(
     Arguments of one `kind` always have the same types. numba looks at every field of every argument
     at each call, which for the kernel takes three times as long as the call itself.
     """
-    if not COMPILED:
+    if not (COMPILED and _known()):
         return function
     if (function, kind) not in _ENTRIES:
         import numba
@@ -90,7 +92,7 @@ _ENTRIES: dict[tuple[object, Hashable], Callable[..., Any]] = {}
 
 def _inner(function: _F, **options: object) -> _F:
     compiled: Any = _compile(function, no_cpython_wrapper=True, no_cfunc_wrapper=True, **options)
-    if compiled is not function:
+    if COMPILED and _known():
         # numba would follow a null pointer if Python called it.
         compiled.__class__ = _inner_class()
     return cast(_F, compiled)
@@ -114,10 +116,39 @@ def _compile(function: _F, **options: object) -> _F:
         return function
     import numba
 
+    if not _known():
+        return cast(_F, numba.njit(error_model="numpy")(function))
     chosen: dict[str, Any] = {"error_model": "numpy", "_nrt": False, **options}
     compiled: Any = numba.njit(**chosen)(function)
     compiled._cache = _cache_class()(function)  # what `cache=True` does, with our class
     return cast(_F, compiled)
+
+
+#: What we use of numba that it does not document. Tried: numba 0.60.0 with NumPy 2.0.2, the oldest
+#: that we allow, and 0.68.1 with 2.4.6.
+_INNER_PARTS = {
+    "caching.FunctionCache": ("_guard_against_spurious_io_errors", "_load_overload"),
+    "caching.IndexDataCacheFile": ("_data_name", "_load_index", "_save_data", "_save_index"),
+    "cpu.CPUTargetOptions": ("_nrt", "forceinline", "no_cfunc_wrapper", "no_cpython_wrapper"),
+    "registry.CPUDispatcher": ("compile",),
+}
+
+
+@lru_cache
+def _known() -> bool:
+    """Whether this numba has all of them; without them it gives the same runs, more slowly."""
+    import numba
+
+    try:
+        for name, parts in _INNER_PARTS.items():
+            module, _, owner = name.partition(".")
+            for part in parts:
+                getattr(getattr(import_module(f"numba.core.{module}"), owner), part)
+    except (ImportError, AttributeError):
+        told = f"minisim does not know numba {numba.__version__}: each process compiles anew"
+        warnings.warn(told, stacklevel=2)
+        return False
+    return True
 
 
 @lru_cache

@@ -181,3 +181,35 @@ def test_code_of_old_sources_does_not_stay(tmp_path: Path) -> None:
         write(tree, factor=factor)
         assert ask(tree) == f"{10.0 + factor} compiled"
     assert len(list((tmp_path / "kept").rglob("caller.answer-*.nbc"))) == 1
+
+
+#: A numba without a part that it does not promise.
+OTHER_NUMBA = """
+import numba.core.caching
+del numba.core.caching.IndexDataCacheFile._save_data
+"""
+
+RUN = """
+from minisim import simulate
+from dim import Dim
+from scenarios import four_way
+print(simulate(four_way(350, horizon=60), Dim(), seed=1).columns.travel_time.tolist())
+"""
+
+
+def test_an_unknown_numba_is_told_and_compiles_without_its_inner_parts(tmp_path: Path) -> None:
+    tree = copied(tmp_path)
+    write(tree)
+    kept = {"PYTHONPATH": str(tree), "NUMBA_CACHE_DIR": str(tree / "kept")}
+    for _ in range(2):
+        done = python("-c", OTHER_NUMBA + ASK, cwd=tree, **kept)
+        assert done.stdout == "10.5 compiled\n"
+        assert "UserWarning: minisim does not know numba" in done.stderr
+    assert not (tree / "kept").exists()
+
+
+@pytest.mark.slow  # compiles the whole engine
+def test_runs_are_the_same_with_an_unknown_numba() -> None:
+    other = python("-W", "ignore", "-c", OTHER_NUMBA + RUN)
+    assert other.stderr == ""
+    assert other.stdout == python("-c", RUN).stdout
