@@ -131,6 +131,7 @@ _INNER_PARTS = {
     "caching.IndexDataCacheFile": ("_data_name", "_load_index", "_save_data", "_save_index"),
     "cpu.CPUTargetOptions": ("_nrt", "forceinline", "no_cfunc_wrapper", "no_cpython_wrapper"),
     "registry.CPUDispatcher": ("compile",),
+    "runtime.rtsys": ("initialize",),
 }
 
 
@@ -155,6 +156,7 @@ def _known() -> bool:
 def _cache_class() -> Any:
     import numba
     from numba.core.caching import FunctionCache, IndexDataCacheFile
+    from numba.core.runtime import rtsys
 
     class Files(IndexDataCacheFile):
         """An index, and the code for each signature, which several processes may write at once.
@@ -191,6 +193,7 @@ def _cache_class() -> Any:
         def load_overload(self, sig: Any, target_context: Any) -> Any:
             """The code on disk; None if there is none, and it has to be compiled."""
             # numba's would first load what only its compiler needs, all of scipy.linalg included.
+            rtsys.initialize(target_context)  # for code that makes arrays
             with self._guard_against_spurious_io_errors():  # type: ignore[no-untyped-call]  # as above
                 found = self._load_overload(sig, target_context)  # type: ignore[no-untyped-call]
             if found is None:
