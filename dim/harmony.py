@@ -69,8 +69,8 @@ class HarmonyMatrix:
         vehicles = VehicleType() if vehicles is None else vehicles
         instance("vehicles", vehicles, (VehicleType, Fleet))
         # Movements of one arm share their start: they are at distance 0 and in conflict too.
-        number("clearance [m]", clearance, low=0, high=10)
-        return _measured(intersection, vehicles, float(clearance), bool(by_type))
+        clearance = number("clearance [m]", clearance, low=0, high=10)
+        return _measured(intersection, vehicles, clearance, bool(by_type))
 
     @classmethod
     def paper(cls, n: int) -> HarmonyMatrix:

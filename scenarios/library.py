@@ -176,7 +176,8 @@ def _scenario(
         if given.get(whole) is not None:
             refuse_beside(whole, (key for key in ("demand", *DRAWN) if key in given))
     day = given.pop("demand", None)
-    if "min_headway" in given and given.get("model") != "shifted":
+    model = given.get("model", "")
+    if "min_headway" in given and isinstance(model, str) and model != "shifted":
         raise InputError("min_headway needs the model 'shifted'")
     profile = given["profile"] = profile_named(given.get("profile", "paper"))
     if given.get("fleet") is not None:

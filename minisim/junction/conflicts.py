@@ -92,8 +92,8 @@ def conflicts(
 
     Movements from the same arm always do. Raises `InputError` for a clearance that is not 0 … 10 m.
     """
-    number("clearance [m]", clearance, low=0, high=10)
-    return _conflicts(intersection, vehicles, float(clearance), by_type)
+    clearance = number("clearance [m]", clearance, low=0, high=10)
+    return _conflicts(intersection, vehicles, clearance, by_type)
 
 
 @lru_cache(maxsize=256)

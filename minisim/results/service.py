@@ -49,7 +49,7 @@ def service(run: Run, interval: float = 900.0, kind: str = "unsignalised") -> pd
     """
     import pandas as pd
 
-    number("interval [s]", interval, low=1, high=1e6)
+    interval = number("interval [s]", interval, low=1, high=1e6)
     trips, begin = run.counted.columns, float(run.scenario.warmup)
     edges = np.arange(begin, trips.end, interval)
     of = np.searchsorted(edges, trips.demand_time, side="right") - 1
