@@ -116,9 +116,9 @@ class Run:
     @cached_property
     def safety(self) -> Mapping[str, float | int | None]:
         """The closest calls in and near the junction; see `minisim.results.safety`."""
-        from minisim.results.safety import near_junction, safety_summary
+        from minisim.results.safety import safety_of
 
-        return safety_summary(near_junction(self.counted.trajectories, self.site), self.site)
+        return safety_of(self.counted)
 
     def summary(
         self, metrics: str | Iterable[Asked] = (), by: Iterable[str] = ()
@@ -170,16 +170,23 @@ class Run:
 
         return as_html(self)
 
+    @property
+    def recorded(self) -> tuple[Records, Records]:
+        """The recording by time, then vehicle, and what each of it is of: `trace` and `rows`.
+
+        Raises `InputError` if nothing was recorded.
+        """
+        if self.record is None:
+            raise InputError("no trajectories: simulate with record='junction' or record='all'")
+        trace = self.trace[np.lexsort((self.rows["id"][self.trace["row"]], self.trace["tick"]))]
+        return trace, self.rows[trace["row"]]
+
     @cached_property
     def trajectories(self) -> pd.DataFrame:
         """One row per vehicle and step, the warm-up's too; `InputError` if not recorded."""
         import pandas as pd
 
-        if self.record is None:
-            raise InputError("no trajectories: simulate with record='junction' or record='all'")
-        trace = self.trace
-        trace = trace[np.lexsort((self.rows["id"][trace["row"]], trace["tick"]))]
-        rows = self.rows[trace["row"]]
+        trace, rows = self.recorded
         intersection, types = self.site.intersection, self.site.types
         movements, path_of = intersection.movements, rows["path"]
         front, heading = np.zeros((2, len(trace), 2))

@@ -15,11 +15,10 @@ Each is a function of a trajectory frame (`run.trajectories`; record="junction" 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-import pandas as pd
 
 from minisim.control import Site
 from minisim.errors import instance
@@ -41,12 +40,20 @@ from minisim.results.trajectories import (
 )  # fmt: skip
 from minisim.results.trips import Ints
 
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from minisim.results.run import Run
+
+#: The columns of a table.
+Columns = dict[str, npt.NDArray[Any]]
+
 #: Longer than any path [m]: keeps vehicles apart in one ascending array.
 _FAR = 1e6
 
 
 class Rows(NamedTuple):
-    """A trajectory frame as arrays, sorted by time, then by vehicle; shape (rows,) each."""
+    """A recording as arrays, sorted by time, then by vehicle; shape (rows,) each."""
 
     time: Floats
     step: Ints
@@ -56,6 +63,7 @@ class Rows(NamedTuple):
     length: Floats
     s: Floats
     v: Floats
+    a: Floats
     goes: Bools
 
 
@@ -66,59 +74,75 @@ def safety_summary(frame: pd.DataFrame, site: Site) -> dict[str, float | int | N
     encroachments, others the short ones (`minisim.results.metrics.PETS`). Raises `InputError` for
     a missing column, or a movement that the site does not have.
     """
-    rows = _rows(frame, site)
-    follow = following(rows, site)
-    pets = encroachments(rows, site)["pet_s"]
-    ttc = np.concatenate([follow["ttc_s"], crossings(rows, site)["ttc_s"]])
-    braking = -frame[ACCELERATION].to_numpy(dtype=float)
+    return _summary(_rows(frame, site), site)
+
+
+def safety_of(run: Run) -> dict[str, float | int | None]:
+    """`safety_summary` of what `record="junction"` keeps; raises `InputError` without a recording.
+
+    It makes no frame, since pandas takes longer to load than a run to be measured.
+    """
+    from minisim.laws import RECORD_BEFORE, RECORD_PAST
+
+    trace, rows = run.recorded
+    paths = run.site.intersection.paths
+    last = np.array([path.exit + RECORD_PAST for path in paths])[rows["path"]]
+    near = (trace["s"] >= paths[0].entry - RECORD_BEFORE) & (trace["s"] <= last)
+    trace, rows = trace[near], rows[near]
+    recording = _recording(
+        run.site, np.round(trace["tick"] * run.site.dt, 6), rows["id"], rows["path"], rows["type"],
+        trace["s"], trace["v"], trace["a"], trace["released"] != 0,
+    )  # fmt: skip
+    return _summary(recording, run.site)
+
+
+def _summary(rows: Rows, site: Site) -> dict[str, float | int | None]:
+    follow = _following(rows, site)
+    pets = _encroachments(rows, site)["pet_s"]
+    ttc = np.concatenate([follow["ttc_s"], _crossings(rows, site)["ttc_s"]])
     return {
         "min_ttc_s": _extreme(np.min, ttc),
         "min_pet_s": _extreme(np.min, pets),
         "max_drac_mps2": _extreme(np.max, follow["drac_mps2"]),
-        "max_braking_mps2": _extreme(np.max, np.maximum(braking, 0.0)),
+        "max_braking_mps2": _extreme(np.max, np.maximum(-rows.a, 0.0)),
         "pets": len(pets),
         **{name: int((pets < limit).sum()) for name, limit in PETS.items()},
     }
 
 
-def near_junction(frame: pd.DataFrame, site: Site) -> pd.DataFrame:
-    """The part of a recording that `record="junction"` keeps."""
-    from minisim.laws import RECORD_BEFORE, RECORD_PAST
-
-    paths = site.intersection.paths
-    last = np.array([path.exit + RECORD_PAST for path in paths])
-    s = frame[S].to_numpy()
-    near = (s >= paths[0].entry - RECORD_BEFORE) & (s <= last[movement_index(frame, site)])
-    return frame[near]
-
-
-def following(frame: pd.DataFrame | Rows, site: Site) -> pd.DataFrame:
+def following(frame: pd.DataFrame, site: Site) -> pd.DataFrame:
     """Each follower and its leader at each step.
 
     Columns `time_s, follower, leader, gap_m, closing_mps, ttc_s, drac_mps2`. TTC is NaN while not
     closing, and 0 where bodies overlap. DRAC is NaN without a gap.
     """
-    rows = _rows(frame, site)
+    return _frame(_following(_rows(frame, site), site))
+
+
+def _following(rows: Rows, site: Site) -> Columns:
     in_lane, to_exit = _leaders_in_lane(rows, site), _leaders_to_exit(rows, site)
     follower, leader, gap = (np.concatenate(both) for both in zip(in_lane, to_exit, strict=True))
     closing = rows.v[follower] - rows.v[leader]
     with np.errstate(divide="ignore", invalid="ignore"):
         ttc = np.where(closing > 0.0, np.maximum(gap, 0.0) / closing, np.nan)
         drac = np.where((closing > 0.0) & (gap > 0.0), closing**2 / (2.0 * gap), np.nan)
-    return pd.DataFrame({
+    return {
         "time_s": rows.time[follower], "follower": rows.vehicle[follower],
         "leader": rows.vehicle[leader], "gap_m": gap, "closing_mps": closing, "ttc_s": ttc,
         "drac_mps2": drac,
-    })  # fmt: skip
+    }  # fmt: skip
 
 
-def encroachments(frame: pd.DataFrame | Rows, site: Site) -> pd.DataFrame:
+def encroachments(frame: pd.DataFrame, site: Site) -> pd.DataFrame:
     """Each pair of vehicles that pass a conflict area of two movements one after the other.
 
     A vehicle still inside when its recording ends counts as leaving then; one whose entry was not
     recorded does not count. Columns `time_s` (the second enters; sorted), `first, second, pet_s`.
     """
-    rows = _rows(frame, site)
+    return _frame(_encroachments(_rows(frame, site), site))
+
+
+def _encroachments(rows: Rows, site: Site) -> Columns:
     areas = _areas(site)
     vehicle, movement, enter, leave = _passages(rows, areas)
     by_movement = [np.flatnonzero(movement == p) for p in range(areas.enter.shape[1])]
@@ -133,14 +157,20 @@ def encroachments(frame: pd.DataFrame | Rows, site: Site) -> pd.DataFrame:
         first, second = order[:-1][changes], order[1:][changes]
         ids = vehicle[passing[first]], vehicle[passing[second]]
         pairs.append(np.stack([start[second], *ids, start[second] - end[first]], axis=-1))
-    table = pd.DataFrame(np.concatenate(pairs), columns=["time_s", "first", "second", "pet_s"])
-    table = table.sort_values("time_s", kind="stable", ignore_index=True)
-    return table.astype({"first": np.int64, "second": np.int64})
+    table = np.concatenate(pairs)
+    time, first, second, pet = table[np.argsort(table[:, 0], kind="stable")].T
+    return {
+        "time_s": time, "first": first.astype(np.int64), "second": second.astype(np.int64),
+        "pet_s": pet,
+    }  # fmt: skip
 
 
-def crossings(frame: pd.DataFrame | Rows, site: Site) -> pd.DataFrame:
+def crossings(frame: pd.DataFrame, site: Site) -> pd.DataFrame:
     """Each step with two vehicles on a crossing course: `time_s, first, second, ttc_s`."""
-    rows = _rows(frame, site)
+    return _frame(_crossings(_rows(frame, site), site))
+
+
+def _crossings(rows: Rows, site: Site) -> Columns:
     areas = _areas(site)
     clear = np.array([path.exit for path in site.intersection.paths])[rows.movement] + rows.length
     going = np.flatnonzero(rows.goes & (rows.s < clear))
@@ -165,29 +195,39 @@ def crossings(frame: pd.DataFrame | Rows, site: Site) -> pd.DataFrame:
         ttcs.append(late[course])
         ahead += 1
     first, second = _join(firsts), _join(seconds)
-    return pd.DataFrame({
+    return {
         "time_s": rows.time[first], "first": rows.vehicle[first], "second": rows.vehicle[second],
         "ttc_s": _join(ttcs, np.float64),
-    })  # fmt: skip
+    }  # fmt: skip
 
 
-def _rows(frame: pd.DataFrame | Rows, site: Site) -> Rows:
-    if isinstance(frame, Rows):
-        return frame
+def _frame(columns: Columns) -> pd.DataFrame:
+    import pandas as pd
+
+    return pd.DataFrame(columns)
+
+
+def _rows(frame: pd.DataFrame, site: Site) -> Rows:
     instance("site", site, Site)
     check_columns(frame)
     frame = frame.sort_values([TIME, VEHICLE])
-    time, s, speed = (frame[name].to_numpy(dtype=float) for name in (TIME, S, SPEED))
-    movement = movement_index(frame, site)
-    entries = np.array([path.entry for path in site.intersection.paths])
+    time, s, v, a = (frame[k].to_numpy(dtype=float) for k in (TIME, S, SPEED, ACCELERATION))
     type = np.zeros(len(frame), int)
     if TYPE in frame.columns:
         type = site.fleet.indices(frame[TYPE].to_numpy(dtype=str))
+    vehicle, released = frame[VEHICLE].to_numpy(np.int64), frame[RIGHT_OF_WAY].to_numpy(bool)
+    return _recording(site, time, vehicle, movement_index(frame, site), type, s, v, a, released)
+
+
+def _recording(
+    site: Site, time: Floats, vehicle: Ints, movement: Ints, type: Ints, s: Floats, v: Floats,
+    a: Floats, released: Bools,
+) -> Rows:  # fmt: skip
+    entries = np.array([path.entry for path in site.intersection.paths])
     return Rows(
-        time=time, step=np.cumsum(np.diff(time, prepend=time[:1]) > 0.0),
-        vehicle=frame[VEHICLE].to_numpy(dtype=np.int64), movement=movement, s=s, v=speed,
-        type=type, length=np.array([it.length for it in site.types])[type],
-        goes=frame[RIGHT_OF_WAY].to_numpy(dtype=bool) | (s >= entries[movement]),
+        time, np.cumsum(np.diff(time, prepend=time[:1]) > 0.0), vehicle, movement, type,
+        np.array([it.length for it in site.types])[type], s, v, a,
+        released | (s >= entries[movement]),
     )  # fmt: skip
 
 
