@@ -12,6 +12,7 @@ vehicles enter a shared exit lane in the order of the schedule.
 
 from __future__ import annotations
 
+import hashlib
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
@@ -24,7 +25,6 @@ from baselines.prediction import predict
 from baselines.reservation import Manager, Reservation, ReservationSession, Slot
 from minisim.control import Advise, Command, Cover, Observed, Plan, Site, View
 from minisim.junction.coordination import STEP, Region, region
-from minisim.names import Name
 from minisim.parameters import checked, declared, real
 
 #: Time that bodies keep apart by default: less than half of that at the edges of the tiles of the
@@ -60,12 +60,16 @@ def _turns(_: str, value: Any) -> tuple[Turn, ...]:
 class Scheduled:
     """Vehicles pass in the order of a schedule that is known beforehand."""
 
-    name = Name("scheduled")
     covers = Cover(alike=True)
 
     turns: tuple[Turn, ...] = checked("the schedule, first vehicle first", _turns, "Turns")
     buffer: float = real("time that bodies keep apart", "s", low=0, high=10, default=BUFFER)
     period: float = real("time between two looks", "s", low=0.01, high=10, default=0.5)
+
+    @property
+    def name(self) -> str:
+        """A short one: a schedule has thousands of numbers."""
+        return f"scheduled#{hashlib.sha256(repr(self).encode()).hexdigest()[:8]}"
 
     def start(self, site: Site) -> ScheduledSession:
         """Begin a run; raises `InputError` for vehicles whose motion cannot be predicted."""

@@ -1,12 +1,8 @@
 import math
 
-import numpy as np
-import pytest
-
-from baselines.optimum.planning import drivable
 from baselines.optimum.separations import edges, necessary
 from scenarios.library import four_way
-from scenarios.profiles import FAIR, PAPER
+from scenarios.profiles import FAIR
 from scenarios.scenario import Scenario
 
 SCENARIO = four_way(profile=FAIR, density=100.0)
@@ -38,16 +34,6 @@ def test_in_a_lane_a_vehicle_keeps_about_its_headway() -> None:
 
 def test_harmonious_movements_have_no_separation() -> None:
     assert between(SCENARIO, "a2", "c2") == -math.inf
-
-
-@pytest.mark.parametrize("profile", [FAIR, PAPER], ids=lambda it: it.name)
-def test_vehicles_are_driven_no_closer_than_they_must_be(profile) -> None:
-    site = four_way(profile=profile, density=100.0).site()
-    least, driven = necessary(site), drivable(site, 0.2)
-    kept = least.rules.between > -math.inf
-    assert (driven.rules.between[kept] >= least.rules.between[kept]).all()
-    same = ~site.intersection.movements.apart
-    assert np.isfinite(least.rules.between[same]).all()
 
 
 def test_a_seed_or_demand_changes_nothing() -> None:
