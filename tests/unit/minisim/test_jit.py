@@ -90,7 +90,7 @@ def test_python_may_call_what_is_compiled_for_compiled_callers_only(tmp_path: Pa
     assert ask(tree, twice).split("\n") == ["10.5 compiled", "3.0 4.0 1"]
 
 
-RUN = """
+COUNTED = """
 import minisim
 from numba.core.registry import cpu_target
 from numba.core.runtime import rtsys
@@ -109,7 +109,7 @@ for profile in ("fair", "as_run"):
 
 def test_compiled_code_keeps_no_memory() -> None:
     """It does not count references, so an array that it made would stay until the process ends."""
-    assert python("-c", RUN, NUMBA_NRT_STATS="1").stdout.split() == ["0", "0"]
+    assert python("-c", COUNTED, NUMBA_NRT_STATS="1").stdout.split() == ["0", "0"]
 
 
 def test_looking_at_the_sources_is_quick() -> None:
