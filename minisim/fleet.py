@@ -87,14 +87,20 @@ _REAR_AXLES = {
 OFFTRACKING = "-offtracking"
 
 
+def kind_of(name: str) -> str:
+    """What a ready type counts as, such as "bus" for "sumo-coach"; other names stay."""
+    plain = name.removesuffix(OFFTRACKING)
+    return _ALIKE.get(plain, plain)
+
+
 def _offtracking(it: VehicleType) -> VehicleType:
-    axle = _REAR_AXLES[_ALIKE.get(it.name, it.name)] * it.length
+    axle = _REAR_AXLES[kind_of(it.name)] * it.length
     return replace(it, name=it.name + OFFTRACKING, rear_axle=round(axle, 2))
 
 
 _RIGID = tuple(
     it for it in (*_INDIAN, *_SUMO)
-    if _ALIKE.get(it.name, it.name) in _REAR_AXLES and it.name != "sumo-trailer"
+    if kind_of(it.name) in _REAR_AXLES and it.name != "sumo-trailer"
 )  # fmt: skip
 
 #: The ready types by name.
@@ -323,8 +329,7 @@ def pcu_factors(fleet: Fleet, unit: str, n: int) -> tuple[float, ...]:
     shares = np.mean([fleet.of_lane(lane) for lane in range(n)], axis=0)
     if len(fleet.types) == 1:  # the unit is defined by cars alone
         return (1.0,)
-    plain = [name.removesuffix(OFFTRACKING) for name in fleet.names]
-    kinds = [_ALIKE.get(name, name) for name in plain]
+    kinds = map(kind_of, fleet.names)
     rows = [table[choice(f"vehicle type in {unit}", kind, table)] for kind in kinds]
     return tuple(
         float(np.interp(share, (0.05, 0.10), row)) for share, row in zip(shares, rows, strict=True)

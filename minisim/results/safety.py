@@ -15,7 +15,7 @@ Each is a function of a trajectory frame (`run.trajectories`; record="junction" 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -41,6 +41,14 @@ from minisim.results.trajectories import (
 )  # fmt: skip
 from minisim.results.trips import Ints
 
+if TYPE_CHECKING:
+    from minisim.results.run import Run
+
+#: An encounter is critical below these [s] (van der Horst 1990, A time-based analysis of road user
+#: behaviour in normal and critical encounters), or above this [m/s²] (Archer 2005, Indicators for
+#: traffic safety assessment and prediction; AASHTO 2018, section 3.2.2).
+SHORT_TTC, SHORT_PET, HIGH_DRAC = 1.5, 1.0, 3.4
+
 #: Longer than any path [m]: keeps vehicles apart in one ascending array.
 _FAR = 1e6
 
@@ -59,17 +67,32 @@ class Rows(NamedTuple):
     goes: Bools
 
 
-def safety_summary(frame: pd.DataFrame, site: Site) -> dict[str, float | int | None]:
+class Encounters(NamedTuple):
+    """The tables of `following`, `encroachments` and `crossings`."""
+
+    follow: pd.DataFrame
+    encroach: pd.DataFrame
+    cross: pd.DataFrame
+
+
+def encounters(frame: pd.DataFrame, site: Site) -> Encounters:
+    """The encounters in a recording; raises `InputError` as `safety_summary`."""
+    rows = _rows(frame, site)
+    return Encounters(following(rows, site), encroachments(rows, site), crossings(rows, site))
+
+
+def safety_summary(
+    frame: pd.DataFrame, site: Site, found: Encounters | None = None
+) -> dict[str, float | int | None]:
     """The closest calls in a recording; None if nothing of the kind happened.
 
     `min_ttc_s` is of following and crossing, `max_drac_mps2` of following; `pets` counts all
     encroachments, others the short ones (`minisim.results.metrics.PETS`). Raises `InputError` for
     a missing column, or a movement that the site does not have.
     """
-    rows = _rows(frame, site)
-    follow = following(rows, site)
-    pets = encroachments(rows, site)["pet_s"]
-    ttc = np.concatenate([follow["ttc_s"], crossings(rows, site)["ttc_s"]])
+    follow, encroach, cross = found or encounters(frame, site)
+    pets = encroach["pet_s"]
+    ttc = np.concatenate([follow["ttc_s"], cross["ttc_s"]])
     braking = -frame[ACCELERATION].to_numpy(dtype=float)
     return {
         "min_ttc_s": _extreme(np.min, ttc),
@@ -79,6 +102,32 @@ def safety_summary(frame: pd.DataFrame, site: Site) -> dict[str, float | int | N
         "pets": len(pets),
         **{name: int((pets < limit).sum()) for name, limit in PETS.items()},
     }
+
+
+def short_ttc(run: Run) -> Floats:
+    """1 for each vehicle with a TTC below `SHORT_TTC` as follower or second, else 0, shape (k,)."""
+    follow, _, cross = run.encounters
+    late = (
+        follow["follower"][follow["ttc_s"] < SHORT_TTC],
+        cross["second"][cross["ttc_s"] < SHORT_TTC],
+    )
+    return _flags(run, np.concatenate(late))
+
+
+def short_pet(run: Run) -> Floats:
+    """1 for each vehicle with a PET below `SHORT_PET` as the second, else 0, shape (k,)."""
+    pets = run.encounters.encroach
+    return _flags(run, pets["second"][pets["pet_s"] < SHORT_PET])
+
+
+def high_drac(run: Run) -> Floats:
+    """1 for each vehicle with a DRAC above `HIGH_DRAC`, else 0, shape (k,)."""
+    follow = run.encounters.follow
+    return _flags(run, follow["follower"][follow["drac_mps2"] > HIGH_DRAC])
+
+
+def _flags(run: Run, vehicles: npt.ArrayLike) -> Floats:
+    return np.isin(run.columns.vehicle, vehicles).astype(float)
 
 
 def near_junction(frame: pd.DataFrame, site: Site) -> pd.DataFrame:

@@ -11,7 +11,8 @@ from rich.text import Text
 
 from minisim.clock import time_of_day
 from minisim.junction.movements import ARM_NAMES
-from minisim.results.metrics import GROUPS, METRICS, SPREAD, Metric, asked_metrics, heading
+from minisim.results.metric import GROUPS, SPREAD, Metric
+from minisim.results.metrics import METRICS, asked_metrics, heading
 from minisim.results.show import conditions, spilled
 from scenarios.statistics import FILLING, Interval
 from scenarios.sweep.cells import SUMS

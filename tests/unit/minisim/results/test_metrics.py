@@ -19,7 +19,8 @@ from dim import Dim, NoisyPerception
 from dim.humans.mixed import Mixed
 from minisim.control import Unregulated
 from minisim.errors import InputError
-from minisim.results.metrics import MEANS, METRICS, SAFETY, TABLE, Metric, heading, metric_of
+from minisim.results.metric import Metric
+from minisim.results.metrics import MEANS, METRICS, SAFETY, TABLE, heading, metric_of
 from minisim.results.run import Run
 from minisim.results.safety import near_junction, safety_summary
 from minisim.results.trips import Floats, Trips

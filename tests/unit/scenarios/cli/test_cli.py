@@ -251,7 +251,7 @@ def test_the_warmup_is_named_and_left_out(capsys: Captured, tmp_path: Path) -> N
 
 
 OWN = """
-from minisim.results.metrics import Metric
+from minisim.results.metric import Metric
 
 
 def delay(trips):
