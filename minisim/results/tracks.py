@@ -47,13 +47,17 @@ class Tracks(NamedTuple):
 
 
 def tracks_of(run: Run) -> Tracks:
-    """The recording of the trips of a run; raises `InputError` if none was made."""
+    """The recording of the trips of a run; raises `InputError` if none was made.
+
+    A row is of the step that ends with it, so SUMO's row of the moment of insertion is left out.
+    """
     if run.record is None:
         raise InputError("no trajectories: simulate with record='junction' or record='all'")
     trace, ids = run.trace, run.columns.vehicle
     rows = run.rows[trace["row"]]
     trip = rows["id"] - (ids[0] if len(ids) else 0)
     own = np.flatnonzero((trip >= 0) & (trip < len(ids)))
+    own = own[trace["tick"][own] * run.site.dt > run.columns.depart[trip[own]] + run.site.dt / 2]
     own = own[np.lexsort((trace["tick"][own], trip[own]))]
     trace, rows = trace[own], rows[own]
     columns = trace["tick"], rows["path"], rows["type"], trace["s"], trace["v"], trace["a"]
