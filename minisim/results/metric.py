@@ -5,7 +5,7 @@ What the function takes depends on `needs`, what it returns on `per`:
 | needs | takes |
 |---|---|
 | trips | the `Trips` of a group: the number is also given by lane, movement and kind |
-| group | the `Run` with the trips of a group alone, likewise |
+| run and trips | the `Run` with the trips of a group alone, likewise |
 | run, counts | the `Run` |
 | trajectories | the `Run`, recorded near the junction at least |
 | whole trajectories | the `Run`, recorded on all of its roads |
@@ -48,7 +48,7 @@ RESERVED: Final = frozenset({
 
 #: What a metric can be measured from.
 NEEDS: Final = (
-    "trips", "group", "run", "trajectories", "whole trajectories", "decisions", "counts",
+    "trips", "run and trips", "run", "trajectories", "whole trajectories", "decisions", "counts",
 )  # fmt: skip
 
 #: What trips can be grouped by -> the groups' key in a summary.
@@ -97,12 +97,15 @@ class Metric:
     symbol: str = text("in equations", empty=True, default="")
     meaning: str = text("in one line", empty=True, default="")
     equation: str = text("with its source", empty=True, default="")
+    grades: str = text(
+        "a letter for each value 1, 2, …, by which it is shown", empty=True, default=""
+    )
     usual: Switch = switch("whether every summary has it", default=False)
 
     @property
     def grouped(self) -> bool:
         """Whether each lane has a value of its own."""
-        return self.per != "run" or self.needs in ("trips", "group")
+        return self.per != "run" or self.needs in ("trips", "run and trips")
 
     @property
     def heading(self) -> str:

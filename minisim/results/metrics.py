@@ -151,8 +151,9 @@ TABLE: Final = (
         equation="time loss + departure delay; by it HCM 2016 grades the level of service",
     ),
     Metric(
-        "level_of_service", _grade, needs="group", title="level of service, 1 = A … 6 = F",
-        meaning="grade of the mean control delay, with unfinished trips",
+        "level_of_service", _grade, needs="run and trips", title="level of service", symbol="LOS",
+        meaning="grade of the mean control delay, with unfinished trips: 1 for A to 6 for F",
+        grades="ABCDEF",
         equation="signals: HCM 2016, exhibit 19-8; all others: exhibits 20-2 and 21-8",
     ),
     Metric(
@@ -173,8 +174,8 @@ TABLE: Final = (
     ),
     Metric(
         "queue", queues.queue_lengths, "veh", "lane", "whole trajectories", title="queue",
-        meaning="vehicles queued on the approach or before the road, over time; the whole: all "
-        "lanes",
+        meaning="vehicles queued on the approach or before the road, over time; the whole run: in "
+        "all lanes together",
         equation="v < 5 km/h for 1 s (SUMO, Simulation/Output/Lanearea Detectors), or waiting to "
         "enter",
     ),

@@ -41,7 +41,9 @@ def grade(run: Run) -> int | None:
     if not len(trips.lane):
         return None
     delay = float(METRICS["control_delay_s"].values(trips, len(trips.lane)).mean())
-    return 1 + "ABCDEF".index(level_of_service(delay, kind_of_junction(run)))
+    return 1 + METRICS["level_of_service"].grades.index(
+        level_of_service(delay, kind_of_junction(run))
+    )
 
 
 def service(run: Run, interval: float = 900.0, kind: str = "") -> pd.DataFrame:

@@ -196,7 +196,12 @@ def _counts(means: Mapping[str, Any]) -> tuple[str, str]:
 
 
 def _means(means: Mapping[str, Any], columns: Iterable[str]) -> list[str]:
-    return [_seconds(means[key]) if key in means else "" for key in columns]
+    return [_shown(key, means[key]) if key in means else "" for key in columns]
+
+
+def _shown(name: str, value: float | None) -> str:
+    grades = METRICS[name].grades if name in METRICS else ""
+    return grades[int(value) - 1] if grades and value else _seconds(value)
 
 
 def _seconds(value: float | None, unit: str = "") -> str:

@@ -197,7 +197,7 @@ def test_a_metric_per_lane_is_a_series_over_time(run: Run) -> None:
 
 
 def test_a_metric_of_a_group_gets_the_run_with_its_trips(run: Run) -> None:
-    size = Metric("size", lambda run: len(run.columns.lane) + run.seed, needs="group")
+    size = Metric("size", lambda run: len(run.columns.lane) + run.seed, needs="run and trips")
     summary = run.summary([size], by=["movement"])
     assert summary["size"] == summary["trips"] + 3
     assert all(it["size"] == it["trips"] + 3 for it in summary["movements"].values())
