@@ -131,20 +131,25 @@ class Run:
         """The closest calls in and near the junction; see `minisim.results.safety`."""
         from minisim.results.safety import safety_summary
 
-        return safety_summary(self.counted._near, self.site, self.counted.encounters)
+        run = self.counted
+        return safety_summary(run.near_junction.trajectories, self.site, run.encounters)
 
     @cached_property
     def encounters(self) -> Encounters:
         """Each encounter of two vehicles in and near the junction; likewise."""
         from minisim.results.safety import encounters
 
-        return encounters(self._near, self.site)
+        return encounters(self.near_junction.trajectories, self.site)
 
     @cached_property
-    def _near(self) -> pd.DataFrame:
-        from minisim.results.safety import near_junction
+    def near_junction(self) -> Run:
+        """The run with what `record="junction"` keeps of its recording."""
+        from minisim.laws import RECORD_BEFORE, RECORD_PAST
 
-        return near_junction(self.trajectories, self.site)
+        paths, s = self.site.intersection.paths, self.trace["s"]
+        last = np.array([path.exit + RECORD_PAST for path in paths])
+        past = s > last[self.rows["path"][self.trace["row"]]]
+        return replace(self, trace=self.trace[(s >= paths[0].entry - RECORD_BEFORE) & ~past])
 
     def summary(
         self, metrics: str | Iterable[Asked] = (), by: Iterable[str] = ()

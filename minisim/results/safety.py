@@ -130,17 +130,6 @@ def _flags(run: Run, vehicles: npt.ArrayLike) -> Floats:
     return np.isin(run.columns.vehicle, vehicles).astype(float)
 
 
-def near_junction(frame: pd.DataFrame, site: Site) -> pd.DataFrame:
-    """The part of a recording that `record="junction"` keeps."""
-    from minisim.laws import RECORD_BEFORE, RECORD_PAST
-
-    paths = site.intersection.paths
-    last = np.array([path.exit + RECORD_PAST for path in paths])
-    s = frame[S].to_numpy()
-    near = (s >= paths[0].entry - RECORD_BEFORE) & (s <= last[movement_index(frame, site)])
-    return frame[near]
-
-
 def following(frame: pd.DataFrame | Rows, site: Site) -> pd.DataFrame:
     """Each follower and its leader at each step.
 

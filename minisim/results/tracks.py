@@ -53,15 +53,15 @@ def tracks_of(run: Run) -> Tracks:
     """
     if run.record is None:
         raise InputError("no trajectories: simulate with record='junction' or record='all'")
-    trace, ids = run.trace, run.columns.vehicle
-    rows = run.rows[trace["row"]]
-    trip = rows["id"] - (ids[0] if len(ids) else 0)
+    trace, rows, ids, dt = run.trace, run.rows, run.columns.vehicle, run.site.dt
+    trip = (rows["id"] - (ids[0] if len(ids) else 0))[trace["row"]]
     own = np.flatnonzero((trip >= 0) & (trip < len(ids)))
-    own = own[trace["tick"][own] * run.site.dt > run.columns.depart[trip[own]] + run.site.dt / 2]
-    own = own[np.lexsort((trace["tick"][own], trip[own]))]
-    trace, rows = trace[own], rows[own]
-    columns = trace["tick"], rows["path"], rows["type"], trace["s"], trace["v"], trace["a"]
-    return Tracks(trip[own], *map(np.ascontiguousarray, columns))
+    own = own[trace["tick"][own] * dt > run.columns.depart[trip[own]] + dt / 2]
+    short = trip[own].astype(np.min_scalar_type(len(ids)))  # numpy sorts 16 bits the fastest
+    own = own[np.argsort(short, kind="stable")]  # a recording is sorted by time
+    row = trace["row"][own]
+    tick, s, v, a = (trace[name][own] for name in ("tick", "s", "v", "a"))
+    return Tracks(trip[own], tick, rows["path"][row], rows["type"][row], s, v, a)
 
 
 def whole_tracks(run: Run) -> Tracks:

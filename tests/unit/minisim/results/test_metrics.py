@@ -23,7 +23,7 @@ from minisim.errors import InputError
 from minisim.results.metric import Metric
 from minisim.results.metrics import MEANS, METRICS, SAFETY, TABLE, heading, metric_of
 from minisim.results.run import Run
-from minisim.results.safety import near_junction, safety_summary
+from minisim.results.safety import safety_summary
 from minisim.results.trips import Floats, Trips
 from minisim.testing import small_scenario
 from scenarios import four_way
@@ -287,8 +287,8 @@ def erring() -> tuple[Run, Run, Run]:
 def test_nothing_else_in_the_warmup_is_measured(erring: tuple[Run, Run, Run]) -> None:
     every, warm, early = erring
     pd.testing.assert_frame_equal(every.trajectories, warm.trajectories)
-    frame = every.trajectories[every.trajectories["time_s"] >= 90.0]
-    assert warm.safety == safety_summary(near_junction(frame, every.site), every.site)
+    frame = every.near_junction.trajectories
+    assert warm.safety == safety_summary(frame[frame["time_s"] >= 90.0], every.site)
     assert warm.safety["pets"] < every.safety["pets"]  # type: ignore[operator]  # both are numbers
     assert early.counts["crossings"] > 0
     for name, count in warm.counts.items():
