@@ -1,10 +1,10 @@
 """The table of metrics: what is measured in a run, in which unit and by which equation.
 
-A metric has one value per trip or one number per run. Trip values are averaged over the whole run
-and over each group of trips, in two forms. SUMO's form, which the paper used, is the mean over the
-trips that ended before the horizon. The complete form is the mean over all demanded trips: an
-unfinished one counts with its waiting, loss and travel up to the horizon, and a vehicle that never
-got onto the road counts with its departure delay.
+A metric has one value per trip, a series per lane or one number per run. Trip values are averaged
+over the whole run and over each group of trips, in two forms. SUMO's form, which the paper used, is
+the mean over the trips that ended before the horizon. The complete form is the mean over all
+demanded trips: an unfinished one counts with its waiting, loss and travel up to the horizon, and a
+vehicle that never got onto the road counts with its departure delay.
 
 Nothing before the end of the warm-up is measured: trips that were demanded, trajectories and
 counts. Only collisions always count, so that no run hides one.
@@ -27,10 +27,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from minisim.control import Advise, Brake, Go, Hold, Radio
 from minisim.errors import InputError, choice, items
 from minisim.parameters import parameters
-from minisim.results import driving, fairness, queues
+from minisim.results import driving, exchange, fairness, queues
 from minisim.results.metric import Metric
 from minisim.results.trips import Floats, Trips, queue_growth
 
@@ -54,35 +53,6 @@ def _grade(run: Run) -> int | None:
     from minisim.results.service import grade
 
     return grade(run)
-
-
-def _messages(run: Run) -> tuple[int, int, Radio] | None:
-    """Messages from vehicles and to them, and their sizes; None if none are sent."""
-    radio: Radio | None = getattr(run.controller, "radio", None)
-    told = sum(run.exchange.get(kind.__name__, 0) for kind in (Go, Hold, Advise, Brake))
-    return (run.exchange.get("shown", 0), told, radio) if radio else None
-
-
-def _message_count(run: Run) -> int:
-    sent = _messages(run)
-    return sent[0] + sent[1] if sent else 0
-
-
-def _message_bytes(run: Run) -> int:
-    sent = _messages(run)
-    return sent[0] * sent[2].state + sent[1] * sent[2].command if sent else 0
-
-
-def _decision_time(percentile: float) -> Callable[[Run], float | None]:
-    """A percentile of the CPU time per decision [µs]."""
-
-    def of(run: Run) -> float | None:
-        times = run.decision_times
-        if times is None:
-            raise InputError("decisions were not timed: simulate with timed=True")
-        return float(np.percentile(times, percentile)) * 1e6 if len(times) else None
-
-    return of
 
 
 def _close(name: str) -> Callable[[Run], Floats]:
@@ -227,7 +197,7 @@ TABLE: Final = (
     ),
     *(
         Metric(
-            name, _decision_time(percentile), "µs", needs="decisions", title=title,
+            name, exchange.decision_time(percentile), "µs", needs="decisions", title=title,
             meaning=f"CPU time of a decision, {title.split()[0]}; differs from run to run",
         )
         for name, percentile, title in (
@@ -236,12 +206,12 @@ TABLE: Final = (
         )
     ),
     Metric(
-        "messages", _message_count, title="messages",
+        "messages", exchange.messages, title="messages",
         meaning="between vehicles and controller; DIM and signals send none",
         equation="vehicles in all views + commands to vehicles (minisim.control.Radio)",
     ),
     Metric(
-        "message_bytes", _message_bytes, "B", title="messages",
+        "message_bytes", exchange.message_bytes, "B", title="messages",
         meaning="the same in bytes", equation="190 each (3GPP TR 36.885), or as declared",
     ),
     Metric(
