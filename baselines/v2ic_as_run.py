@@ -152,9 +152,10 @@ class V2ICAsRunSession:
         junction.refuse_roads("the as-run V2I-C")
         self._origin = junction.approach_length - site.vehicle.length - INSERTION
         if self._origin < LEFT:
+            least = LEFT - self._origin + junction.arm_length
             raise InputError(
                 f"the as-run V2I-C ends {LEFT:g} m after insertion, but the approach lanes leave "
-                f"{self._origin:.4g} m"
+                f"{self._origin:.4g} m; {junction.too_short(f'at least {least:g}')}"
             )
         insertion = self._origin + INSERTION
         self.rules = AsRunList()

@@ -219,9 +219,11 @@ class AsRunSession:
         self._origin = site.intersection.approach_length - site.vehicle.length - INSERTION
         zones = rules.red_start, rules.yellow_start, rules.green_start, rules.bound
         if rules.red_start > self._origin:
+            least = rules.red_start - self._origin + site.intersection.arm_length
             raise InputError(
                 f"the as-run zones begin {rules.red_start:g} m after insertion, but the approach "
-                f"lanes leave {self._origin:.4g} m"
+                f"lanes leave {self._origin:.4g} m; "
+                f"{site.intersection.too_short(f'at least {least:g}')}"
             )
         self.plan = Plan(
             marks=tuple(self._origin - edge for edge in (*zones, FREED, CLEAR, FOLLOWED)),

@@ -19,7 +19,7 @@ from typing import NoReturn
 import numpy as np
 import numpy.typing as npt
 
-from minisim.errors import FileError, InputError, instance, integer, number, show
+from minisim.errors import FileError, InputError, instance, integer, number, plural, show
 from minisim.files import read_file, write_text
 from minisim.fleet import Fleet, Vehicles
 from minisim.junction.conflicts import CLEARANCE, conflicts
@@ -69,8 +69,8 @@ class HarmonyMatrix:
         vehicles = VehicleType() if vehicles is None else vehicles
         instance("vehicles", vehicles, (VehicleType, Fleet))
         # Movements of one arm share their start: they are at distance 0 and in conflict too.
-        number("clearance [m]", clearance, low=0, high=10)
-        return _measured(intersection, vehicles, float(clearance), bool(by_type))
+        clearance = number("clearance [m]", clearance, low=0, high=10)
+        return _measured(intersection, vehicles, clearance, bool(by_type))
 
     @classmethod
     def paper(cls, n: int) -> HarmonyMatrix:
@@ -148,7 +148,7 @@ class HarmonyMatrix:
         # A controller's repr is kept as provenance, where the digest tells matrices apart.
         digest = hashlib.sha256(self.values.tobytes()).hexdigest()[:8]
         pairs = int(self.values.sum()) // 2
-        return f"<HarmonyMatrix of {self.n} arms, {pairs} pairs in harmony, {digest}>"
+        return f"<HarmonyMatrix of {self.n} arms, {plural(pairs, 'pair')} in harmony, {digest}>"
 
 
 @lru_cache(maxsize=256)
@@ -211,7 +211,7 @@ def _parse(data: bytes, where: str) -> HarmonyMatrix:
     if len(rows) - 1 != len(labels):
         raise InputError(
             f"{where}, line {rows[-1][0]}: not square: the header names {len(labels)} movements, "
-            f"but {len(rows) - 1} rows follow"
+            f"but {plural(len(rows) - 1, 'row')} {'follows' if len(rows) == 2 else 'follow'}"
         )
     values = [
         _row(cells, label, labels, f"{where}, line {line}")
@@ -240,7 +240,9 @@ def _table(data: bytes, where: str) -> list[tuple[int, list[str]]]:
     width = len(rows[0][1])
     for line, cells in rows:
         if len(cells) != width:
-            raise FileError(f"{where}, line {line}: {len(cells)} cells, but the header has {width}")
+            raise FileError(
+                f"{where}, line {line}: {plural(len(cells), 'cell')}, but the header has {width}"
+            )
     return rows
 
 

@@ -74,11 +74,14 @@ class Zones:
                 f"yellow zone [m] must be more than {STOP_LINE_GAP:g} with SUMO's vehicles, which "
                 f"stop that far before a line, got {self.yellow:g}"
             )
-        room = site.intersection.shortest_approach - site.vehicle.length
+        junction = site.intersection
+        room = junction.shortest_approach - site.vehicle.length
         if self.red_start > room:
+            needed = self.red_start + site.vehicle.length + junction.junction_radius
+            told = junction.too_short(f"at least {needed:g}")
             raise InputError(
-                f"the zones are {self.red_start:g} m long, but the approach lanes leave only "
-                f"{room:.4g} m in front of an inserted vehicle; increase arm_length"
+                f"the zones are {self.red_start:g} m long, but an approach lane leaves only "
+                f"{room:.4g} m in front of an inserted vehicle; {told}"
             )
 
 

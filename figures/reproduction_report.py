@@ -12,6 +12,7 @@ from figures import style
 from figures.gallery import GALLERY, SECTIONS, write
 from figures.studies.shared.section import Drawing, Item
 from figures.tables import Table
+from minisim.errors import plural
 from minisim.files import make_folder, write_text
 from minisim.version import __version__
 from scenarios.studies import NAMES, study_named
@@ -57,7 +58,7 @@ def _report(
     yield "# The paper's experiments, reproduced"
     yield (
         f"minisim {__version__}; the seeds 1 … {effort.seeds}, {effort.horizon:g} s per run, "
-        f"{jobs} {'process' if jobs == 1 else 'processes'}. All controllers of a cell get the "
+        f"{plural(jobs, 'process', 'processes')}. All controllers of a cell get the "
         "same arrivals, except in `as-run`, where some labels state the wrong inflow. "
         "Intervals are 95 %, Student's t over seeds."
     )
@@ -183,7 +184,8 @@ def _saturated(studies: Iterable[Results]) -> str:
         "end. Their means depend on the horizon; they are not delays that a driver could expect."
     )
     if short:
-        lines.append(f"- The runs of {short} cells are too short: the roads were still filling.")
+        cells = plural(short, "cell")
+        lines.append(f"- The runs of {cells} are too short: the roads were still filling.")
     return f"{head}\n\n" + ("\n".join(lines) or "None.")
 
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
+from minisim.clock import clock
 from minisim.errors import InputError
 from minisim.inflow import MAX_TIME, Floats, Ints
 from minisim.junction.movements import ARM_NAMES, Bools
@@ -19,13 +20,19 @@ LEAST_FACTOR, MOST_FACTOR = 0.2, 2.0
 
 @dataclass(frozen=True, eq=False)
 class Arrivals:
-    """An arrival table, sorted by demand time and lane; all columns have the shape (k,)."""
+    """An arrival table, sorted by demand time and lane; all columns have the shape (k,).
+
+    Raises `InputError` for columns of another shape or type, or a value out of range.
+    """
 
     time: Floats  # demand time [s]
     lane: Ints  # index of the approach lane
     manoeuvre: Ints  # 1 … n−1
     speed_factor: Floats | None = None  # drivers' factors on the speed limit; None: they are drawn
     type: npt.NDArray[np.str_] | None = None  # names of the vehicles' types; None: they are drawn
+
+    #: What a clock shows at time 0 [s]; messages tell times by it. No field: it changes no run.
+    origin: ClassVar[float] = 0.0
 
     def __post_init__(self) -> None:
         time = _column("demand_time_s", self.time, np.float64)
@@ -65,13 +72,18 @@ class Arrivals:
         return ranks(self.lane)
 
     def between(self, start: float, end: float) -> Arrivals:
-        """The arrivals from `start` [s] to before `end`, with times counted from `start`."""
+        """The arrivals from `start` [s] to before `end`, with times counted from `start`.
+
+        Messages go on to tell times by the clock of this table.
+        """
         here = slice(*self.time.searchsorted((start, end)))
         factors = None if self.speed_factor is None else self.speed_factor[here]
         types = None if self.type is None else self.type[here]
-        return Arrivals(
+        made = Arrivals(
             self.time[here] - start, self.lane[here], self.manoeuvre[here], factors, types
         )
+        object.__setattr__(made, "origin", self.origin + start)
+        return made
 
     def check(self, n: int, allowed: Bools | None = None) -> None:
         """Raise `InputError` for a lane or manoeuvre that does not exist with n arms.
@@ -85,9 +97,10 @@ class Arrivals:
             raise InputError(f"manoeuvre {bad} does not exist with {n} arms (1 … {n - 1})")
         if allowed is not None:
             for bad in np.flatnonzero(~allowed[self.lane, self.manoeuvre - 1]).tolist():
+                way = f"{ARM_NAMES[self.lane[bad]]}{self.manoeuvre[bad]}"
                 raise InputError(
-                    f"the vehicle of {self.time[bad]:g} s takes {ARM_NAMES[self.lane[bad]]}"
-                    f"{self.manoeuvre[bad]}, which is forbidden here or against a one-way road"
+                    f"the vehicle of {clock(self.origin + self.time[bad])} takes {way}, which is "
+                    "forbidden here or against a one-way road"
                 )
 
     def rates(self, n: int, horizon: float) -> tuple[float, ...]:

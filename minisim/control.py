@@ -106,17 +106,18 @@ class Site:
         self.fleet.check(self.intersection.n)
         room = self.intersection.shortest_approach
         if (needed := self.vehicle.length + self.vehicle.margin) >= room:
+            more = f"more than {self.intersection.junction_radius + needed:g}"
             raise InputError(
-                f"no vehicle of {self.vehicle.length:g} m can be inserted on approach lanes of "
-                f"{room:g} m; arm_length must be more than "
-                f"{self.intersection.junction_radius + needed:g} m"
+                f"no vehicle of {self.vehicle.length:g} m can be inserted on an approach lane of "
+                f"{room:g} m; {self.intersection.too_short(more)}"
             )
         if entry_room(self.intersection, self.fleet) <= 0.0:
             tight = [it for it in self.types if entry_room(self.intersection, it) <= 0.0]
             it = tight[0] if tight else self.vehicle
+            widths = " … ".join(f"{it:g}" for it in sorted(set(self.intersection.lane_widths)))
             raise InputError(
                 f"vehicles of {it.length:g} × {it.width:g} m ({it.name}) do not fit lanes of "
-                f"{self.intersection.lane_width:g} m here: turning into an exit lane, one would "
+                f"{widths} m here: turning into an exit lane, one would "
                 "touch another that waits beside it; a larger lane_width or junction_radius helps"
             )
 

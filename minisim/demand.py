@@ -107,7 +107,7 @@ class ArrivalModel:
         second, which ends the run if more vehicles come than there are manoeuvres: at 350
         veh/h/lane, in 0.4 % of the lane-seconds.)
         """
-        number("duration [s]", duration, above=0, high=MAX_TIME)
+        duration = number("duration [s]", duration, above=0, high=MAX_TIME)
         inflow, bounds = _laid_out(
             self, n, duration, None if allowed is None else allowed.tobytes()
         )

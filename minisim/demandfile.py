@@ -47,6 +47,8 @@ def read_demand(path: AnyPath, start: float | str | None = None) -> DemandProfil
         raise FileError(f"{path} is not valid TOML: {error}") from error
     known = [it.name for it in parameters(DemandProfile) if it.name != "periods"]
     for key in table:
+        if key not in known and any(it.name == key for it in parameters(Period)):
+            raise FileError(f"{path}: unknown key {key!r}; it belongs to a period, [[period]]")
         _made(f"{path}", choice, {"name": "key", "value": key, "allowed": ["period", *known]})
     blocks = table.pop("period", None)
     if not isinstance(blocks, list) or not all(isinstance(block, dict) for block in blocks):

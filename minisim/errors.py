@@ -155,6 +155,11 @@ def kind_word(kind: type) -> str:
     return _WORDS.get(kind, f"{article} {kind.__name__}")
 
 
+def plural(count: int, thing: str, several: str = "") -> str:
+    """A count of things: "1 run", "2 runs"; `several` is their plural if that is not with an s."""
+    return f"{count} {thing if count == 1 else several or f'{thing}s'}"
+
+
 def printable(name: str, value: object, *, empty: bool = False) -> str:
     """Return `value` if it is a text of one line without control characters, or raise.
 

@@ -1,4 +1,4 @@
-"""Fleets: vehicle types with their shares, ready types, and passenger car units."""
+"""Fleets: vehicle types with their shares, and ready types."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from minisim.errors import InputError, choice, instance, number, show
+from minisim.errors import InputError, choice, instance, number, plural, show
 from minisim.junction.movements import ARM_NAMES
 from minisim.parameters import Takes, checked, declared
 from minisim.streams import Draws
@@ -170,7 +170,10 @@ class Fleet:
 
     def __post_init__(self) -> None:
         if len(self.shares) != len(self.types):
-            raise InputError(f"{len(self.types)} types need as many shares, got {self.shares}")
+            raise InputError(
+                f"a fleet needs a share per type: it has {plural(len(self.types), 'type')}, got "
+                f"{self.shares}"
+            )
         counts = {len(row) for row in self.shares}
         if len(counts - {1}) > 1:
             raise InputError(f"shares by lane need a number per lane, got {self.shares}")
@@ -297,46 +300,3 @@ def fleet_named(value: FleetLike, base: VehicleType) -> Fleet:
         raise InputError(f"fleet must be {wanted}, got {show(value)}")
     types = tuple(TYPES[choice("vehicle type", name, TYPES)] for name in value)
     return driven_like(Fleet(types, tuple(value.values())), base)
-
-
-#: Units of an inflow that are passenger car units, and how many a vehicle of each type counts.
-#:
-#: `pcu` is IRC:106-1990 (table 1), with a factor for a type that makes up 5 % of the traffic and
-#: one for 10 % or more. `pcu-irc64` is IRC:64-1990, with one. `pcu-hcm` is the Highway Capacity
-#: Manual (2000, chapter 16), which counts a heavy vehicle at a junction as two cars, and knows
-#: neither motorcycles nor auto-rickshaws.
-PCU: Mapping[str, Mapping[str, tuple[float, float]]] = {
-    "pcu": {
-        "motorcycle": (0.5, 0.75), "auto-rickshaw": (1.2, 2.0), "car": (1.0, 1.0),
-        "lcv": (1.4, 2.0), "bus": (2.2, 3.7), "truck": (2.2, 3.7),
-    },
-    "pcu-irc64": {
-        "motorcycle": (0.5, 0.5), "auto-rickshaw": (1.0, 1.0), "car": (1.0, 1.0),
-        "lcv": (1.5, 1.5), "bus": (3.0, 3.0), "truck": (3.0, 3.0),
-    },
-    "pcu-hcm": {"car": (1.0, 1.0), "lcv": (1.0, 1.0), "bus": (2.0, 2.0), "truck": (2.0, 2.0)},
-}  # fmt: skip
-
-
-def pcu_factors(fleet: Fleet, unit: str, n: int) -> tuple[float, ...]:
-    """Passenger car units of a vehicle of each type, by its mean share over `n` lanes.
-
-    If a unit has two factors, the first holds up to a share of 5 % and the second from 10 % on; in
-    between, the factor is interpolated. Raises `InputError` for an unknown unit, or a type without
-    a factor.
-    """
-    table = PCU[choice("passenger car unit", unit, PCU)]
-    shares = np.mean([fleet.of_lane(lane) for lane in range(n)], axis=0)
-    if len(fleet.types) == 1:  # the unit is defined by cars alone
-        return (1.0,)
-    kinds = map(kind_of, fleet.names)
-    rows = [table[choice(f"vehicle type in {unit}", kind, table)] for kind in kinds]
-    return tuple(
-        float(np.interp(share, (0.05, 0.10), row)) for share, row in zip(shares, rows, strict=True)
-    )
-
-
-def mean_pcu(fleet: Fleet, unit: str, n: int) -> tuple[float, ...]:
-    """Passenger car units of the mean vehicle of each of `n` lanes."""
-    factors = pcu_factors(fleet, unit, n)
-    return tuple(float(np.dot(factors, fleet.of_lane(lane))) for lane in range(n))

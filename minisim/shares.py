@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from minisim.errors import InputError, numbers, show
+from minisim.errors import InputError, numbers, plural, show
 from minisim.inflow import Floats
 from minisim.junction.movements import ARM_NAMES, Bools
 
@@ -103,7 +103,7 @@ def turning(name: str, turns: Turns, n: int, allowed: Bools | None = None) -> Fl
     by_lane = _by_lane(turns)
     rows: Any = turns if by_lane else (turns,) * n
     if len(rows) != n:
-        raise InputError(f"{name} has {len(rows)} rows for {n} lanes")
+        raise InputError(f"{name} has {plural(len(rows), 'row')} for {n} lanes")
     shares = np.array([
         _summing_to_one(f"{name} on lane {lane}" if by_lane else name, row, n - 1, "manoeuvres")
         for lane, row in zip(ARM_NAMES, rows, strict=False)
@@ -133,5 +133,5 @@ def _summing_to_one(name: str, given: Any, count: int, things: str) -> tuple[flo
     if given is None:
         return (1.0 / count,) * count
     if len(given) != count:
-        raise InputError(f"{name} has {len(given)} shares for {count} {things}")
+        raise InputError(f"{name} has {plural(len(given), 'share')} for {count} {things}")
     return tuple(share / sum(given) for share in given)

@@ -127,7 +127,7 @@ class Simulation:
             CollisionError: two bodies touched, unless collisions are only recorded.
             ControllerError: the controller answered with something that is not a command.
         """
-        number("until [s]", until, low=0)
+        until = number("until [s]", until, low=0)
         target = min(first_tick(until, self.site.dt), self._horizon_tick)
         if not self._started:
             self._started = True

@@ -120,7 +120,7 @@ def drained(
     arms: int = 4, *, density: float = 350.0, demand_time: float = 300.0, **options: Any
 ) -> SmallScenario:
     """A small scenario that gives any working controller the time to serve every vehicle."""
-    number("demand_time [s]", demand_time, above=0, high=1e6)
+    demand_time = number("demand_time [s]", demand_time, above=0, high=1e6)
     vehicles = arms * density * demand_time / 3600.0
     drain = SECONDS_PER_ROAD + SECONDS_PER_VEHICLE * vehicles
     return small_scenario(arms, density=density, demand_time=demand_time, drain=drain, **options)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from rich import box
 from rich.table import Table
 
-from minisim.errors import InputError, MinisimError
+from minisim.errors import InputError, MinisimError, plural
 from minisim.files import markdown_table, write_table, write_text
 from minisim.parameters import Reals, declared, real, reals, whole
 from minisim.results.metrics import heading
@@ -96,8 +96,9 @@ def run_tour(tour: Tour, jobs: int, progress: Callable[[int, int], None]) -> pd.
     if len(failed):
         first = failed.iloc[0]
         raise MinisimError(
-            f"{len(failed)} of {len(rows)} runs failed; the first ({first['controller']}, "
-            f"{first['density']:g} veh/h/lane, seed {first['seed']}): {first['error']}"
+            f"{len(failed)} of {plural(len(rows), 'run')} failed; the first "
+            f"({first['controller']}, {first['density']:g} veh/h/lane, seed {first['seed']}): "
+            f"{first['error']}"
         )
     return average(rows)
 
@@ -122,8 +123,8 @@ def average(rows: pd.DataFrame) -> pd.DataFrame:
 def demo_title(tour: Tour) -> str:
     """What the table shows, in one line."""
     return (
-        f"4 arms, profile {PROFILE}, {tour.horizon:g} s simulated, {tour.seeds} seeds per point: "
-        "mean ± 95 % confidence interval"
+        f"4 arms, profile {PROFILE}, {tour.horizon:g} s simulated, "
+        f"{plural(tour.seeds, 'seed')} per point: mean ± 95 % confidence interval"
     )
 
 

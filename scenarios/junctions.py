@@ -55,6 +55,8 @@ def junction_from(path: AnyPath, node: str | None = None, side: str | None = Non
         raise FileError(f"{path} is not valid TOML: {error}") from error
     try:
         for key in table:
+            if key not in KEYS and any(field.name == key for field in fields(Road)):
+                raise InputError(f"unknown key {key!r}; it belongs to a road, [[roads]]")
             choice("key of a junction", key, KEYS)
         name = table.pop("name", Path(path).stem)
         if "bearings" not in table:

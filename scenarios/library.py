@@ -16,11 +16,13 @@ from minisim.arrivals import Arrivals
 from minisim.demand import Demand, DemandProfile
 from minisim.errors import InputError, choice, instance, integer, nearest, numbers, show
 from minisim.files import AnyPath
-from minisim.fleet import PCU, Fleet, fleet_named, mean_pcu
+from minisim.fleet import Fleet, fleet_named
 from minisim.junction.geometry import Intersection
 from minisim.junction.movements import ARM_NAMES
 from minisim.junction.paths import Way
 from minisim.junction.roads import Road
+from minisim.pcu import UNITS, mean_pcu
+from minisim.recorded import read_arrivals
 from minisim.shares import Turns
 from minisim.vehicle import VehicleType
 from scenarios.junctions import is_junction_file, junction_from
@@ -40,7 +42,7 @@ class Options(TypedDict, total=False):
 
     A profile may be a name, a fleet as for `minisim.fleet.fleet_named`, and shares (`split`,
     `turns`) numbers or a text such as "4:3:2:1". `unit` is that of the density: "veh", or passenger
-    car units (`minisim.fleet.PCU`). A `demand` by time of day replaces all that says how many
+    car units (`minisim.pcu.UNITS`). A `demand` by time of day replaces all that says how many
     vehicles come; a run of it lasts until its end, unless there is a `horizon`.
     """
 
@@ -174,12 +176,13 @@ def _scenario(
         if given.get(whole) is not None:
             refuse_beside(whole, (key for key in ("demand", *DRAWN) if key in given))
     day = given.pop("demand", None)
-    if "min_headway" in given and given.get("model") != "shifted":
+    model = given.get("model", "")
+    if "min_headway" in given and isinstance(model, str) and model != "shifted":
         raise InputError("min_headway needs the model 'shifted'")
     profile = given["profile"] = profile_named(given.get("profile", "paper"))
     if given.get("fleet") is not None:
         given["fleet"] = fleet_named(given["fleet"], profile.vehicle)
-    unit = choice("unit", given.pop("unit", VEHICLES), (VEHICLES, *PCU))
+    unit = choice("unit", given.pop("unit", VEHICLES), (VEHICLES, *UNITS))
     demand, rest = (
         {field.name: given[field.name] for field in fields(kind) if field.name in given}
         for kind in (Demand, Scenario)
@@ -206,6 +209,19 @@ def _in_vehicles(scenario: Scenario, unit: str) -> Scenario:
     split = demand.split if len(set(means)) == 1 else tuple(rates)
     density = sum(rates) / len(scenario.intersection.approaches)
     return replace(scenario, demand=replace(demand, density=density, split=split))
+
+
+def replayed(scenario: Scenario, path: AnyPath, start: float | str | None = None) -> Scenario:
+    """The scenario, with the arrivals of a file in place of its demand.
+
+    `start` is as in `minisim.recorded.read_arrivals`. Raises what that raises, and `InputError` for
+    arrivals that the scenario cannot replay; every message names the file.
+    """
+    arrivals = read_arrivals(path, scenario.intersection.n, start or 0.0)
+    try:
+        return replace(scenario, recorded=arrivals)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
 
 
 def refuse_beside(whole: str, others: Iterable[str]) -> None:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import cached_property
 
 from minisim.arrivals import Arrivals
 from minisim.clock import clock
 from minisim.control import Site
 from minisim.demand import Demand, DemandProfile
-from minisim.errors import InputError, number
-from minisim.fleet import Fleet, driven_like
+from minisim.errors import InputError, choice, number
+from minisim.fleet import TYPES, Fleet, driven_like
 from minisim.junction.geometry import Intersection
 from minisim.parameters import declared, part, real, text
 from scenarios.profiles import PAPER, Profile
@@ -49,13 +50,27 @@ class Scenario:
         if self.recorded is not None:
             self.recorded.check(n, allowed)
             if self.recorded.type is not None:
-                self.vehicles.indices(self.recorded.type)
+                self._check_types(self.recorded.type)
             if len(self.recorded) and (first := self.recorded.time[0]) >= self.horizon:
+                told = f"the horizon of {self.horizon:g} s"
+                if origin := self.recorded.origin:
+                    told += f" from {clock(origin)} on"
                 raise InputError(
-                    f"no vehicle comes within the horizon of {self.horizon:g} s: the first "
-                    f"recorded arrival is at {clock(first)}; `start` says where in the table a run "
-                    f"begins"
+                    f"no vehicle comes within {told}: the first recorded arrival is at "
+                    f"{clock(origin + first)}; `start` says where in the table a run begins"
                 )
+
+    def _check_types(self, types: Iterable[str]) -> None:
+        """Raise `InputError` for recorded types that are not in the fleet."""
+        for name in sorted(set(map(str, types)) - set(self.vehicles.names)):
+            if self.fleet is None:
+                known = choice("vehicle type of the arrivals:", name, TYPES)
+                raise InputError(
+                    f"the arrivals have the vehicle type {known!r}, but the profile "
+                    f"{self.profile.name} drives {self.vehicles.names[0]} alone; a fleet with all "
+                    f"their types is needed, such as car:0.9,{known}:0.1"
+                )
+            choice("vehicle type of the arrivals:", name, self.vehicles.names)
 
     @property
     def vehicles(self) -> Fleet:

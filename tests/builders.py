@@ -37,6 +37,7 @@ from minisim.control import (
     View,
     Wake,
 )
+from minisim.counts import Count, read_counts
 from minisim.engine import packed
 from minisim.engine.state import DRIVING, TRACE, Layout, Records
 from minisim.errors import FileError
@@ -460,3 +461,40 @@ def rearranged(simulation: Simulation) -> None:
     simulation._pack = pack_of(
         simulation._vehicles, simulation._lanes, simulation._layout, simulation._law
     )
+
+
+#: German: a row per stream and interval, a column per class; streams by approach and letter.
+GERMAN = "\n".join([
+    "zufahrt,spur,kennung,intervall_start,intervall_ende,rad,krad,pkw,lkw,bus",
+    *(f"{arm},1,{arm}{turn}..(1),{start},{end},2,1,{n},0,{bus}"
+      for start, end, n in (("06:00", "06:15", 20), ("06:15", "06:30", 40))
+      for arm in "ABCD" for turn, bus in (("L", 0), ("G", 3), ("R", 0))),
+    "B,2,BW..(14),06:00,06:15,0,0,7,0,0",
+    "B,2,BW..(14),06:15,06:30,0,0,0,0,0",
+])  # fmt: skip
+
+#: American: a row per interval with a column per movement, no classes.
+MOVES = [f"{way}{turn}" for way in ("NB", "SB", "EB", "WB") for turn in "LTRU"]
+AMERICAN = "\n".join([
+    "\t".join(["Time", *MOVES]),
+    "\t".join(["7:45 AM", *(["10", "80", "5", "1"] * 4)]),
+    "\t".join(["8:00 AM", *(["20", "90", "15", "0"] * 4)]),
+])  # fmt: skip
+
+#: British: a row per interval, pair of arms and class; semicolons and decimal commas.
+BRITISH = "\n".join([
+    "Time;From;To;Class;Vehicles",
+    *(f"{time};{a};{b};{kind};{n}"
+      for time in ("07:00 - 07:15", "07:15 - 07:30")
+      for a in "123" for b in "123" if a != b
+      for kind, n in (("Car", "12,5"), ("OGV1", "2"), ("PSV", "1"), ("Pedal Cycle", "4"))),
+])  # fmt: skip
+
+
+def read_count(
+    folder: Path, text: str, mapping: Mapping[str, Any] | None = None, encoding: str = "utf-8"
+) -> Count:
+    """A count from the text of a sheet."""
+    path = folder / "sheet.csv"
+    path.write_bytes(text.encode(encoding))
+    return read_counts(path, mapping)

@@ -12,7 +12,7 @@ from typing import Any
 from baselines.signals.heads import Colour, Heads, full_order, lane_order, stopping_sight
 from baselines.signals.webster import MIN_GREEN, SignalTiming, timing_of, webster
 from minisim.control import Command, Plan, Site, View, Wake
-from minisim.errors import InputError, number, numbers
+from minisim.errors import InputError, number, numbers, plural
 from minisim.names import Name
 from minisim.parameters import Switch, Takes, checked, declared, real, refuse_idle, switch
 
@@ -97,7 +97,7 @@ class FixedTime:
         else:
             greens = self.greens if isinstance(self.greens, tuple) else (self.greens,) * n
         if len(greens) != n:
-            raise InputError(f"greens has {len(greens)} values for {n} lanes")
+            raise InputError(f"greens has {plural(len(greens), 'value')} for {n} lanes")
         cycle = self._program(greens, site).cycle
         return timing_of(greens, cycle, demand, flow, longer=longer, capped=capped)
 

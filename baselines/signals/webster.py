@@ -57,11 +57,11 @@ def webster(
     for flow in flows:
         number("rate [veh/h]", flow, low=0, high=1e5)
     n = len(flows)
-    number("saturation_flow [veh/h]", saturation_flow, low=1, high=1e5)
+    saturation_flow = number("saturation_flow [veh/h]", saturation_flow, low=1, high=1e5)
     lost = n * number("lost_time_per_phase [s]", lost_time_per_phase, low=0, high=120)
     instance("equal_greens", equal_greens, bool)
-    number("min_green [s]", min_green, above=0, high=600)
-    number("max_cycle [s]", max_cycle, low=lost + n * min_green, high=3600)
+    min_green = number("min_green [s]", min_green, above=0, high=600)
+    max_cycle = number("max_cycle [s]", max_cycle, low=lost + n * min_green, high=3600)
 
     ratio = sum(flows) / saturation_flow
     capped = ratio > MAX_FLOW_RATIO and optimal_cycle(ratio, lost) > max_cycle
@@ -100,10 +100,10 @@ def webster_delay(rate: float, green: float, cycle: float, saturation_flow: floa
     [veh/h] and the degree of saturation x = qC/(sg); infinite for x ≥ 1. Near x = 1 it overstates
     the delay in a finite run, where the queue has not had time to grow.
     """
-    number("rate [veh/h]", rate, low=0, high=1e5)
-    number("cycle [s]", cycle, above=0, high=1e5)
-    number("green [s]", green, low=0.1, high=cycle)
-    number("saturation_flow [veh/h]", saturation_flow, low=1, high=1e5)
+    rate = number("rate [veh/h]", rate, low=0, high=1e5)
+    cycle = number("cycle [s]", cycle, above=0, high=1e5)
+    green = number("green [s]", green, low=0.1, high=cycle)
+    saturation_flow = number("saturation_flow [veh/h]", saturation_flow, low=1, high=1e5)
     share = green / cycle
     x = rate / (saturation_flow * share)
     if x >= 1.0:

@@ -14,7 +14,7 @@ from dim.controller import Dim, DimSession
 from dim.perception import ROUNDING
 from dim.proofs.protocol import COMMITTED, LOOK, ROLLING, WAITING, Event, Protocol, State
 from minisim.control import Command, Go, Hold, Observed, Plan, Site, View
-from minisim.errors import InputError, MinisimError
+from minisim.errors import InputError, MinisimError, show
 from minisim.parameters import declared, part
 
 
@@ -24,13 +24,19 @@ class ConformanceError(MinisimError):
 
 @declared
 class Checked:
-    """A `Dim` whose runs are checked against the protocol as they go."""
+    """A `Dim` whose runs are checked against the protocol as they go.
+
+    `InputError` for one with priorities other than the lanes' own.
+    """
 
     dim: Dim = part("the controller, with the lanes' own priorities", Dim)
 
     def __post_init__(self) -> None:
         if self.dim.priorities is not None:
-            raise InputError("the protocol is checked with the lanes' own priorities only")
+            raise InputError(
+                "the protocol is checked with the lanes' own priorities only, got priorities="
+                f"{show(self.dim.priorities)}"
+            )
 
     @property
     def name(self) -> str:

@@ -50,7 +50,10 @@ class Lasso:
 def explore(
     protocol: Protocol, max_states: int = MAX_STATES, progress: Visited | None = None
 ) -> Exploration:
-    """Visit states, nearest first, up to the first unsafe ones; `InputError` beyond the limit."""
+    """Visit states, nearest first, up to the first unsafe ones.
+
+    Raises `InputError` for more than `max_states`, of which each takes about 300 bytes of memory.
+    """
     instance("protocol", protocol, Protocol)
     integer("max_states", max_states, low=1)
     reached: Reached = {protocol.start: None}
@@ -91,6 +94,7 @@ def starvation(protocol: Protocol) -> tuple[Lasso | None, ...]:
 
     None proves over all states that it cannot, if all vehicles look between any two events, a
     vehicle that can go on eventually does, and a rotating priority lasts long enough to decide.
+    Raises `InputError` for what is not a protocol.
     """
     instance("protocol", protocol, Protocol)
     reached: Reached = {protocol.start: None}

@@ -96,7 +96,8 @@ def analyse(
 ) -> Analysis:
     """Try all cases (20 s for 6 arms) but those with a movement that is `closed`, such as "a2".
 
-    Raises `InputError` as `DecisionTable`, and from 8 arms on.
+    `order` and `priorities` are those of `dim.Dim`. Raises `InputError` as `DecisionTable`, for a
+    movement that does not exist, and from 8 arms on.
     """
     table = DecisionTable(matrix, order, priorities)
     n, total = matrix.n, len(table)
@@ -108,7 +109,7 @@ def analyse(
     sizes: Counter[int] = Counter()
     ties: Counter[int] = Counter()
     worst: dict[int, tuple[Movements, int]] = {}
-    tried, shut = 0, set(closed)
+    tried, shut = 0, {str(matrix.movements[matrix.index(it)]) for it in closed}
     for case, movements in enumerate(table, start=1):
         if progress is not None and (case % 256 == 0 or case == total):
             progress(case, total)
@@ -139,7 +140,10 @@ def analyse(
 
 
 def brute_force(movements: Movements, matrix: HarmonyMatrix) -> Cliques:
-    """The cliques among participants (at most one per lane), from all 2^k subsets of them."""
+    """The cliques among k participants (at most one per lane), from all 2^k subsets of them.
+
+    Nothing of `dim.decision` is used, so that it can be compared with this.
+    """
     k = len(movements)
     rows = [matrix.index(m) for m in movements]
     friends = [sum(1 << j for j in range(k) if matrix.values[i, rows[j]]) for i in rows]
@@ -174,7 +178,7 @@ def preferred(cliques: Iterable[Lanes], by_priority: Sequence[int]) -> tuple[Lan
 
 
 def node_orders(movements: Movements, n: int) -> Iterator[Movements]:
-    """Orders in which participants may list each other; see `ALL_ORDERS`."""
+    """Orders in which participants at a junction of n arms may list each other (`ALL_ORDERS`)."""
     if n <= ALL_ORDERS:
         yield from permutations(movements)
         return

@@ -15,6 +15,7 @@ from dim import Explanation, explain
 from dim.proofs.verification import Analysis
 from figures import style
 from figures.junction import drawing
+from minisim.errors import plural
 from minisim.junction.geometry import Intersection
 
 #: Colours and dashes of tied cliques, so that they are told apart without colour too.
@@ -39,9 +40,9 @@ def verification_figure(analysis: Analysis, intersection: Intersection) -> Figur
     for axes, (size, (movements, count)) in zip(panels[2:], worst, strict=True):
         told = explain(movements, analysis.matrix, analysis.order, analysis.priorities)
         draw_cliques(axes, told, intersection)
-        vehicles = "1 vehicle" if size == 1 else f"{size} vehicles"
+        vehicles = plural(size, "vehicle")
         axes.set_title(
-            f"Worst case: {analysis.most_tied} cliques of {vehicles}\n"
+            f"Worst case: {plural(analysis.most_tied, 'clique')} of {vehicles}\n"
             f"{' '.join(map(str, movements))}{'' if count == 1 else f' (one of {count})'}",
             fontsize=10, color=style.INK, loc="center",
         )  # fmt: skip

@@ -15,6 +15,7 @@ from dim import Explanation
 from figures import plots, style
 from figures.junction import drawing
 from minisim.control import Plan, Site
+from minisim.errors import plural
 from minisim.junction.geometry import Intersection
 from minisim.junction.paths import Floats
 from minisim.vehicle import VehicleType
@@ -107,7 +108,7 @@ def _draw_graph(axes: Axes, explanation: Explanation, intersection: Intersection
         drawing.draw_node(axes, places[movement], str(movement), goes=movement in chosen)
     pairs = math.comb(len(explanation.participants), 2)
     tied = len(explanation.tied)
-    cliques = "1 clique" if tied == 1 else f"{tied} cliques"
+    cliques = plural(tied, "clique")
     axes.text(
         0.0, -1.46, f"{len(explanation.edges)} of {pairs} pairs in harmony (lines); "
         f"{cliques} of the largest size, {len(explanation.tied[0])}",

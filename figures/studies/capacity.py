@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from figures import plots, style
 from figures.studies.shared.section import Item, Section
 from figures.tables import Table
+from minisim.errors import plural
 from scenarios.controllers import RIVALS
 from scenarios.studies.capacity import STUDY, Capacity, capacities
 from scenarios.studies.shared.archive import MissingRunsError
@@ -83,7 +84,7 @@ def capacity_table(results: Results) -> Table:
 def _extent(results: Results) -> str:
     search = results.effort.search
     return (
-        f"{results.effort.warning}Mean and 95 % interval over {search.seeds} seeds of "
+        f"{results.effort.warning}Mean and 95 % interval over {plural(search.seeds, 'seed')} of "
         f"{search.horizon:g} s, with the search's rounding of {search.step / 2.0:g} "
         "veh/h/lane"
     )

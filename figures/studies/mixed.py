@@ -20,7 +20,7 @@ WAITING = MEASURES["waiting time"]
 ARMS = (3, 4, 5)
 WORDS = {"car": "cars alone", "india": "vehicles registered in India"}
 DENSITY_LABEL = "demand [PCU/h/lane]"
-#: What the paper compares DIM with.
+#: The controllers with which the paper compares DIM.
 COMPARED = ("fixed-time", "adaptive", "v2ic")
 
 
@@ -48,7 +48,7 @@ def mixed_figure(results: Results) -> Figure:
 
 
 def differences(results: Results, rival: str, gate: str) -> dict[tuple[int, float], str]:
-    """DIM's mean waiting less a rival's, with Indian vehicles: (arms, demand) -> text."""
+    """DIM's mean waiting minus a rival's, with Indian vehicles: (arms, demand) -> text [s]."""
     good = results.good
     words = {}
     for arms in ARMS:
@@ -60,7 +60,7 @@ def differences(results: Results, rival: str, gate: str) -> dict[tuple[int, floa
 
 
 def mixed_table(results: Results) -> Table:
-    """DIM's waiting beside that of each rival of the paper, with Indian vehicles."""
+    """How much longer vehicles wait under DIM than under the paper's rivals, Indian fleet."""
     rows = []
     for rival, gate in product(COMPARED, GATES):
         known = differences(results, rival, gate)
@@ -70,19 +70,19 @@ def mixed_table(results: Results) -> Table:
                 rows.append((style.look(gate).label, style.look(rival).label, str(arms), texts))
     if not rows:
         raise MissingRunsError(
-            "the store has no demand at which DIM and a rival ran with two common seeds; make "
-            f"them with: {results.effort.command('mixed')}"
+            "the store has no demand at which DIM and a rival have two seeds in common; make such "
+            f"runs with: {results.effort.command('mixed')}"
         )
     densities = sorted({density for *_, texts in rows for density in texts})
     return Table(
-        "DIM's mean waiting less a rival's, vehicles registered in India [s]",
-        ("controller", "less", "arms", *(f"{density:g}" for density in densities)),
+        "DIM's mean waiting minus a rival's, with the vehicles registered in India [s]",
+        ("controller", "minus", "arms", *(f"{density:g}" for density in densities)),
         tuple((*names, *(texts.get(d, "–") for d in densities)) for *names, texts in rows),
         labels=3,
         notes=(
-            f"{missing_note(results)}  Columns: demand [PCU/h/lane] by IRC:106-1990. Complete "
-            "means; paired differences over common arrivals with their 95 % intervals. Lanes of "
-            "3.5 m; profile fair.",
+            f"{missing_note(results)}  A column is a demand in PCU/h/lane (IRC:106-1990). Means "
+            "are over all vehicles, those still on the road too; differences are paired by common "
+            "arrivals, ± half a 95 % interval. Profile fair, lanes of 3.5 m.",
         ),
     )
 

@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 import re
-import tomllib
+from collections import defaultdict
 from collections.abc import Iterator, Mapping
-from typing import Any, Final, NamedTuple
+from functools import partial
+from typing import Any, NamedTuple
 
-from minisim.counts.sheets import Sheet, interval_of, number_of
-from minisim.counts.words import CLASSES, COLUMNS, TURNS, compass, near_word, plain, word_of
-from minisim.errors import FileError, choice, instance
-from minisim.files import AnyPath, read_file
-from minisim.fleet import TYPES
-
-#: Keys of a mapping besides the columns.
-MAPPING: Final = (*COLUMNS, "interval", "from", "until", "arms", "classes", "turns")
+from minisim.counts.mapping import check_used
+from minisim.counts.sheets import Sheet, interval_of, number_of, read_sheet
+from minisim.counts.words import (
+    CLASSES,
+    COLUMNS,
+    TURNS,
+    compass,
+    is_total,
+    near_word,
+    plain,
+    word_of,
+)
+from minisim.errors import FileError, InputError, choice
+from minisim.files import AnyPath
 
 
 class Record(NamedTuple):
@@ -30,33 +37,67 @@ class Record(NamedTuple):
     vehicles: float
 
 
-def read_mapping(mapping: AnyPath | Mapping[str, Any] | None) -> Mapping[str, Any]:
-    """A mapping from a table or a TOML file, with known keys and types of vehicles."""
-    if mapping is None or isinstance(mapping, Mapping):
-        table: Mapping[str, Any] = mapping or {}
-    else:
-        try:
-            table = tomllib.loads(read_file("mapping", mapping).decode())
-        except (ValueError, RecursionError) as error:
-            raise FileError(f"{mapping} is not valid TOML: {error}") from error
-    for key in table:
-        choice("key of a mapping", key, MAPPING)
-    for key in ("classes", "turns"):
-        instance(key, table.get(key, {}), dict)
-    for name, kind in table.get("classes", {}).items():
-        choice(f"type of the class {name!r},", kind, (*TYPES, "left out"))
-    return table
+class _Layout(NamedTuple):
+    """Which columns hold what; indices of columns."""
+
+    columns: dict[str, int]  # key of `COLUMNS` -> column
+    streams: dict[int, tuple[str, str, str]]  # column of a movement -> approach, turn, exit
+    kinds: dict[int, str]  # column of a class -> its name
 
 
-def records_of(
-    sheet: Sheet, given: Mapping[str, Any], place: str, notes: list[str]
-) -> Iterator[Record]:
-    """Every count of a sheet; `given` is a mapping, and what was assumed goes into `notes`.
+def records_of(path: AnyPath, given: Mapping[str, Any], notes: list[str]) -> Iterator[Record]:
+    """Every count of a sheet; `given` is a mapping, and what is assumed goes into `notes`.
 
-    Raises `FileError` as `minisim.counts.read_counts`.
+    Once all are read, a mapping of words that none of them has is refused. Raises `FileError` and
+    `InputError` as `minisim.counts.read_counts`.
     """
+    sheet = read_sheet(path, partial(_is_header, given))
+    columns, streams, kinds = layout = _layout(sheet, given, f"{path}", notes)
+    names = {"classes": set(kinds.values()), "turns": set[str]()}
+    noticed: dict[str, list[int]] = defaultdict(list)  # what -> lines
+    seen: set[tuple[object, ...]] = set()
+    days: set[str] = set()
+    for line, cells in sheet.rows:
+        where = f"{path}, line {line}"
+        said = {key: cells[k] for key, k in columns.items() if k < len(cells)}
+        if any(is_total(said.get(key, "")) for key in ("start", "approach", "turn", "exit")):
+            noticed["rows of totals or shares, left out"].append(line)
+            continue
+        if len(cells) != len(sheet.header):
+            raise FileError(f"{where}: {len(sheet.header)} cells are needed, got {len(cells)}")
+        start, end, day = interval_of(said["start"], said.get("end"), where)
+        if len(days := days | ({day} if day else set())) > 1:
+            raise FileError(f"{where}: a second day, {day}; keep the rows of one day")
+        if "approach" in said and not said["approach"]:
+            raise FileError(f"{where}: the approach is empty; each row needs one")
+        if not kinds and "class" in said:
+            names["classes"].add(said["class"])
+        if not streams and not said.get("exit"):
+            names["turns"].add(said.get("turn", ""))
+        for approach, turn, out, kind, cell in _counts(said, cells, layout):
+            if not cell:
+                noticed["empty cells, taken as 0"].append(line)
+            if (what := (start, approach, turn, out, kind)) in seen:
+                noticed["counts given twice, and added"].append(line)
+            seen.add(what)
+            vehicles = number_of(cell, where, sheet.decimal)
+            yield Record(where, start, end, approach, turn, out, kind, vehicles)
+    check_used(given, "classes", names["classes"], f"{path}", "class")
+    check_used(given, "turns", names["turns"], f"{path}", "turn")
+    for told, lines in noticed.items():
+        notes.append(f"{told}: {len(lines)}, the first in line {lines[0]}")
+
+
+def _is_header(given: Mapping[str, Any], cells: list[str]) -> bool:
+    """Whether a row has the name of a column for the start of intervals, and others."""
+    starts = any(word_of(cell, {"start": COLUMNS["start"]}) for cell in cells)
+    return len(list(filter(None, cells))) > 2 and (given.get("start") in cells or starts)
+
+
+def _layout(sheet: Sheet, given: Mapping[str, Any], place: str, notes: list[str]) -> _Layout:
+    """What the columns mean; those without a meaning are noted."""
     columns = _columns(sheet, given, place)
-    rest = {k: name for k, name in enumerate(sheet.header) if k not in columns.values()}
+    rest = {k: name for k, name in enumerate(sheet.header) if k not in columns.values() and name}
     streams: dict[int, tuple[str, str, str]] = {}
     kinds: dict[int, str] = {}
     if "approach" in columns:
@@ -66,52 +107,51 @@ def records_of(
     if problem := _problem(columns, streams, kinds):
         raise FileError(f"{place}: {problem}")
     idle = ("turn", "exit", "count") if streams else ("class", "count") if kinds else ()
+    for key in idle:
+        if key in given:
+            counts = ", ".join(sheet.header[k] for k in streams or kinds)
+            raise InputError(
+                f"{place}: the mapping has {key} = {given[key]!r}, but the counts are in the "
+                f"columns {counts}"
+            )
     unused = [sheet.header[columns[key]] for key in idle if key in columns]
     for k, name in rest.items():
-        if not name or k in streams or k in kinds:
+        if k in streams or k in kinds:
             continue
         if not streams and (near := near_class(name)) and _numeric(sheet, k):
             raise FileError(f"{place}: unknown class {name!r}; did you mean {near!r}?")
         unused.append(name)
+    nameless = [k for k, name in enumerate(sheet.header) if not name]
+    if any(cell for _, cells in sheet.rows for k, cell in enumerate(cells) if k in nameless):
+        unused.append("those without a name")
+    if sheet.titles:
+        notes.append(f"above the header, not used: {', '.join(sheet.titles)}")
     if unused:
         notes.append(f"columns not used: {', '.join(unused)}")
     if not kinds and "class" not in columns:
         notes.append("no classes: all count as cars")
-    days: set[str] = set()
-    empty: list[int] = []  # lines
-    seen: set[tuple[object, ...]] = set()
-    again: list[int] = []
-    for line, cells in sheet.rows:
-        where = f"{place}, line {line}"
-        said = {key: cells[k] for key, k in columns.items()}
-        start, end, day = interval_of(said["start"], said.get("end"), where)
-        if len(days := days | ({day} if day else set())) > 1:
-            raise FileError(f"{where}: a second day, {day}; keep the rows of one day")
-        way = (said.get("approach", ""), said.get("turn", ""), said.get("exit", ""))
-        kind = said.get("class", "car")
-        if streams:
-            counted = [(*stream, kind, cells[k]) for k, stream in streams.items()]
-        else:
-            counted = [(*way, name, cells[k]) for k, name in kinds.items()]
-        for approach, turn, out, name, cell in counted or [(*way, kind, said["count"])]:
-            empty += [line] if not cell else []
-            again += [line] if (what := (start, approach, turn, out, name)) in seen else []
-            seen.add(what)
-            vehicles = number_of(cell, where, sheet.decimal)
-            yield Record(where, start, end, approach, turn, out, name, vehicles)
-    if empty:
-        notes.append(f"empty cells, taken as 0: {len(empty)}, the first in line {empty[0]}")
-    if again:
-        notes.append(
-            f"counts given twice, and added: {len(again)}, the first again in line {again[0]}"
-        )
+    return _Layout(columns, streams, kinds)
+
+
+def _counts(
+    said: Mapping[str, str], cells: list[str], layout: _Layout
+) -> Iterator[tuple[str, str, str, str, str]]:
+    """Approach, turn, exit, class and cell of every count of a row."""
+    way = (said.get("approach", ""), said.get("turn", ""), said.get("exit", ""))
+    kind = said.get("class", "car")
+    if layout.streams:
+        yield from ((*stream, kind, cells[k]) for k, stream in layout.streams.items())
+    elif layout.kinds:
+        yield from ((*way, name, cells[k]) for k, name in layout.kinds.items())
+    else:
+        yield (*way, kind, said["count"])
 
 
 def class_of(name: str, given: Mapping[str, Any]) -> str | None:
     """What a class of a sheet means: a key of `CLASSES`, a type or "left out"; None if unknown."""
     if name in given.get("classes", {}):
         return str(given["classes"][name])
-    return word_of(name, CLASSES)
+    return "total" if is_total(name) else word_of(name, CLASSES)
 
 
 def near_class(name: str) -> str | None:
@@ -120,15 +160,25 @@ def near_class(name: str) -> str | None:
 
 
 def _columns(sheet: Sheet, given: Mapping[str, Any], place: str) -> dict[str, int]:
-    """What a column means -> its index, as the mapping says or by its name."""
+    """What a column means -> its index, as the mapping says or by its name.
+
+    A name that may mean times or arms, such as "from", means times if it has any.
+    """
     found: dict[str, int] = {}
     known = {plain(name): k for k, name in reversed(list(enumerate(sheet.header)))}
+    both = {*COLUMNS["start"], *COLUMNS["end"]} & {*COLUMNS["approach"], *COLUMNS["exit"]}
     for key, words in COLUMNS.items():
         if key in given:
             name = choice(f"column of {place} for {key}:", given[key], sheet.header)
+            if sheet.header.index(name) in found.values():
+                raise InputError(f"the mapping has the column {name!r} of {place} for two keys")
             found[key] = sheet.header.index(name)
             continue
-        column = next((known[word] for word in (plain(key), *words) if word in known), None)
+        named = [(word, known[word]) for word in (plain(key), *words) if word in known]
+        column = next((
+            k for word, k in named
+            if word not in both or _timed(sheet, k) == (key in ("start", "end"))
+        ), None)  # fmt: skip
         if column is not None and column not in found.values():
             found[key] = column
     if "start" not in found:
@@ -166,5 +216,11 @@ def _movement(name: str) -> tuple[str, str, str] | None:
 
 
 def _numeric(sheet: Sheet, column: int) -> bool:
-    cells = [cells[column] for _, cells in sheet.rows]
+    cells = [cells[column] for _, cells in sheet.rows if column < len(cells)]
     return any(cells) and all(not cell or cell.replace(",", ".").isdecimal() for cell in cells)
+
+
+def _timed(sheet: Sheet, column: int) -> bool:
+    """Whether the first cell of a column is a time of day."""
+    cells = [cells[column] for _, cells in sheet.rows if column < len(cells)]
+    return re.search(r"\d[:.h]\d\d", next(filter(None, cells), "")) is not None

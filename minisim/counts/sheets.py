@@ -5,6 +5,8 @@ from __future__ import annotations
 import csv
 import io
 import re
+from collections.abc import Callable
+from statistics import median
 from typing import Final, NamedTuple
 
 from minisim.clock import seconds_of
@@ -15,40 +17,46 @@ from minisim.files import AnyPath, read_file
 DATE: Final = r"\b(\d{4}-\d{2}-\d{2}|\d{1,2}[./]\d{1,2}[./]\d{2,4})[ T]"
 
 
+#: A header comes within so many lines that are not blank, after titles.
+TITLES: Final = 20
+
+
 class Sheet(NamedTuple):
     """The cells of a file: the names of its columns and the rows, each with its line number."""
 
     header: list[str]
-    rows: list[tuple[int, list[str]]]
+    rows: list[tuple[int, list[str]]]  # perhaps with fewer cells than the header, or more
     decimal: str  # comma or point
+    titles: list[str]  # the cells above the header that are not empty
 
 
-def read_sheet(path: AnyPath) -> Sheet:
+def read_sheet(path: AnyPath, is_header: Callable[[list[str]], bool]) -> Sheet:
     """Read a table with a header: UTF-8, UTF-16 or Windows' letters; commas, semicolons or tabs.
 
-    Raises `FileError` for a file that is unreadable, empty or no table.
+    The header is the first of the first `TITLES` rows of which `is_header` is true, or else the
+    first with the most names. Raises `FileError` for a file that is unreadable, empty or no table.
     """
     text = _decoded(read_file("counts", path), path)
-    head = next((line for line in text.splitlines() if line.strip()), "")
-    delimiter = max(";\t,|", key=head.count)
-    if not head.count(delimiter):
-        raise FileError(f"{path} is not a table: its first line has no comma, semicolon or tab")
+    lines = [line for line in text.splitlines() if line.strip()] or [""]
+    delimiter = max(";\t,|", key=lambda mark: median(line.count(mark) for line in lines))
+    if not any(delimiter in line for line in lines):
+        raise FileError(f"{path} is not a table: its lines have no comma, semicolon or tab")
     try:
         reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter, strict=True)
         rows = [(reader.line_num, [cell.strip() for cell in row]) for row in reader]
     except csv.Error as error:
         raise FileError(f"cannot read counts from {path}: {error}") from error
-    (_, header), *filled = [row for row in rows if any(row[1])]
-    for line, cells in filled:
-        if len(cells) != len(header):
-            raise FileError(
-                f"{path}, line {line}: {len(header)} cells are needed, got {len(cells)}"
-            )
-    if not filled:
+    filled = [row for row in rows if any(row[1])]
+    names = [len(list(filter(None, cells))) for _, cells in filled[:TITLES]]
+    fullest = names.index(max(names))
+    first = next((k for k in range(len(names)) if is_header(filled[k][1])), fullest)
+    header = filled[first][1]
+    if not filled[first + 1 :]:
         raise FileError(f"{path} has no counts, only a header")
     if again := [name for name in header if name and header.count(name) > 1]:
         raise FileError(f"{path}: there is more than one column {again[0]!r}")
-    return Sheet(header, filled, "." if delimiter == "," else ",")
+    titles = [cell for _, cells in filled[:first] for cell in cells if cell]
+    return Sheet(header, filled[first + 1 :], "." if delimiter == "," else ",", titles)
 
 
 def _decoded(data: bytes, path: AnyPath) -> str:

@@ -8,13 +8,18 @@ import unicodedata
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Final
 
-#: What a column may mean -> its usual names, in plain letters (`plain`).
+#: What a column may mean -> its usual names, in plain letters (`plain`). Times decide what "from"
+#: and "to" mean: an interval, or the arms of a movement.
 COLUMNS: Final[Mapping[str, tuple[str, ...]]] = {
     "start": (
         "start", "intervallstart", "starttime", "begin", "beginn", "time", "timestart", "zeit",
-        "uhrzeit", "interval", "intervall", "period", "timeperiod",
+        "uhrzeit", "interval", "intervall", "period", "timeperiod", "zeitvon", "uhrzeitvon",
+        "vonuhrzeit", "timefrom", "fromtime", "zeitraum", "from", "von",
     ),
-    "end": ("end", "intervallende", "endtime", "ende", "timeend"),
+    "end": (
+        "end", "intervallende", "endtime", "ende", "timeend", "zeitbis", "uhrzeitbis", "bisuhrzeit",
+        "timeto", "totime", "until", "bis", "to",
+    ),
     "approach": ("approach", "zufahrt", "arm", "knotenarm", "leg", "from", "origin", "von"),
     "turn": ("turn", "turning", "movement", "kennung", "manoeuvre", "maneuver", "richtung"),
     "exit": ("exit", "to", "destination", "ausfahrt", "nach"),
@@ -37,14 +42,19 @@ CLASSES: Final[Mapping[str, tuple[str, ...]]] = {
     "bus": ("bus", "buses", "psv", "kom", "coach"),
     "bicycle": ("bicycle", "bicycles", "rad", "fahrrad", "bike", "bikes", "pc", "cycle", "cycles"),
     "pedestrian": ("pedestrian", "pedestrians", "peds", "fussganger", "fuss"),
-    "total": ("total", "summe", "gesamt", "sum", "kfz", "all"),
+    "total": ("kfz", "all"),  # and see `is_total`
 }  # fmt: skip
+
+_TOTAL: Final = re.compile(
+    r"(?<![^\W_])((grand|sub)?totals?|sums?|\w*summen?|gesamt|insgesamt|percent|prozent)(?![^\W_])|[Σ∑%]",
+    re.IGNORECASE,
+)
 
 #: Classes that are not simulated, and why.
 LEFT_OUT: Final = {
     "bicycle": "bicycles are not simulated",
     "pedestrian": "pedestrians are not simulated",
-    "total": "a sum, not a class",
+    "total": "a sum or a share, not a class",
 }
 
 #: Turns, from left to right, and back -> the words of sheets for them.
@@ -76,9 +86,24 @@ def word_of(text: str, words: Mapping[str, Sequence[str]]) -> str | None:
     return next((key for key, said in words.items() if known == plain(key) or known in said), None)
 
 
+def is_total(text: str) -> bool:
+    """Whether a cell or a column's name says that it holds a sum or share, such as "Summe Kfz"."""
+    return _TOTAL.search(text) is not None
+
+
 def near_word(text: str, words: Iterable[str], cutoff: float = 0.6) -> str | None:
     """The one of `words` that is most like a text, or None if none is."""
     return next(iter(difflib.get_close_matches(plain(text), words, n=1, cutoff=cutoff)), None)
+
+
+def hint(near: str | None) -> str:
+    """What a message asks or says after an unknown word."""
+    return f"; did you mean {near!r}?" if near else "; a mapping can say what it is"
+
+
+def near_point(name: str) -> str | None:
+    """The written-out point of the compass that is most like an arm's name, or None if none is."""
+    return near_word(name, [word for word in _POINTS if len(word) > 2])
 
 
 def compass(name: str) -> tuple[str, bool] | None:

@@ -19,7 +19,7 @@ place, drag = njit_inline(locate), njit_inline(dragged)
 
 @njit_inner
 def may_touch(
-    floats: Floats, ints: Ints, lanes: Records, road: Layout, law: Law, bodies: Floats
+    floats: Floats, ints: Ints, lanes: Records, layout: Layout, law: Law, bodies: Floats
 ) -> bool:
     """Broad phase: whether any two bodies in or near the junction may touch.
 
@@ -33,7 +33,7 @@ def may_touch(
         inside |= law.entry <= where[i] <= away[i]
     if not inside:
         return False
-    ends, shape, headings = road.ends, road.shape, road.headings
+    ends, shape, headings = layout.ends, layout.shape, layout.headings
     found = 0
     for lane in range(len(lanes)):
         first = lanes[lane]["slot"]
@@ -48,9 +48,9 @@ def may_touch(
             past, crossing = s - law.entry, ends[p, 0] - law.entry
             x, y = place(shape[p], headings[p], crossing, past)
             kind = ints[TYPE, i]
-            axle = road.types[kind].rear_axle
+            axle = layout.types[kind].rear_axle
             if axle > 0.0:
-                ux, uy = drag(shape[p], headings[p], crossing, past, road.trails[kind, p], axle)
+                ux, uy = drag(shape[p], headings[p], crossing, past, layout.trails[kind, p], axle)
             else:
                 x_rear, y_rear = place(shape[p], headings[p], crossing, past - length)
                 along = math.hypot(x - x_rear, y - y_rear)
@@ -60,7 +60,7 @@ def may_touch(
             bodies[found, 2] = ux
             bodies[found, 3] = uy
             bodies[found, 4] = length / 2.0 + TOUCH_MARGIN
-            bodies[found, 5] = road.types[kind].width / 2.0 + TOUCH_MARGIN
+            bodies[found, 5] = layout.types[kind].width / 2.0 + TOUCH_MARGIN
             found += 1
     for i in range(found):
         for j in range(i):

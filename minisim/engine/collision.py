@@ -41,11 +41,11 @@ class Collision(NamedTuple):
         return f"at {self.time:.1f} s {one} and {other} touched"
 
 
-def collisions_now(vehicles: Records, road: Layout, site: Site, time: float) -> list[Collision]:
+def collisions_now(vehicles: Records, layout: Layout, site: Site, time: float) -> list[Collision]:
     """All collisions at this moment: pymunk decides near the junction, the gap within a lane."""
     rows, bodies = near_bodies(vehicles, site)
     pairs = [(rows[i], rows[j]) for i, j in touching(bodies)]
-    pairs += _overlaps_in_lane(vehicles, road)
+    pairs += _overlaps_in_lane(vehicles, layout)
     names = site.intersection.movements.names
     collisions = []
     for pair in pairs:
@@ -70,12 +70,12 @@ def near_bodies(vehicles: Records, site: Site) -> tuple[list[int], list[Body]]:
     return rows, bodies
 
 
-def _overlaps_in_lane(vehicles: Records, road: Layout) -> list[tuple[int, int]]:
+def _overlaps_in_lane(vehicles: Records, layout: Layout) -> list[tuple[int, int]]:
     """Row pairs (j, i) in which the front of vehicle i has reached the rear of j ahead of it."""
     s, path, lane = vehicles["s"], vehicles["path"], vehicles["lane"]
     rears = s - vehicles["length"]
     driving = vehicles["status"] == DRIVING
-    exits, branch = road.ends[:, 0], road.branch
+    exits, branch = layout.ends[:, 0], layout.branch
     pairs = []
     for i in np.flatnonzero(driving).tolist():
         p = path[i]

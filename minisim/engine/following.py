@@ -64,7 +64,7 @@ from minisim.laws import (
 
 @njit_inline
 def accelerate(
-    floats: Floats, ints: Ints, vehicles: Records, lanes: Records, road: Layout, law: Law,
+    floats: Floats, ints: Ints, vehicles: Records, lanes: Records, layout: Layout, law: Law,
     braking: bool,
 ) -> bool:  # fmt: skip
     """Choose every vehicle's acceleration; returns whether two overlap."""
@@ -72,10 +72,10 @@ def accelerate(
     next_ahead(floats, padded(n))
     overlap = False
     for lane in range(len(lanes)):
-        overlap |= near_junction(floats, ints, lanes, road, law, lane)
-    overlap |= weigh(floats, ints, road, law, n)
-    choose(floats, ints, vehicles, lanes, road, law, n)
-    keep_rooms(floats, ints, road, law, n)
+        overlap |= near_junction(floats, ints, lanes, layout, law, lane)
+    overlap |= weigh(floats, ints, layout, law, n)
+    choose(floats, ints, vehicles, lanes, layout, law, n)
+    keep_rooms(floats, ints, layout, law, n)
     limit(floats, n, braking)
     return overlap
 
@@ -95,14 +95,14 @@ def next_ahead(floats: Floats, n: int) -> None:
 
 @njit_inline
 def near_junction(
-    floats: Floats, ints: Ints, lanes: Records, road: Layout, law: Law, lane: int
+    floats: Floats, ints: Ints, lanes: Records, layout: Layout, law: Law, lane: int
 ) -> bool:
     """The leaders of the vehicles that have entered the junction, and of the first that has not.
 
     Returns whether two overlap.
     """
     overlap = False
-    branch = road.branch
+    branch = layout.branch
     s, v, length, b_max, leave = floats[S], floats[V], floats[LENGTH], floats[B_MAX], floats[LEAVE]
     row, path, ahead = ints[ROW], ints[PATH], ints[AHEAD]
     first = lanes[lane]["slot"]
@@ -126,14 +126,14 @@ def near_junction(
 
         # A vehicle that cannot stop before the junction sees past a leader that may turn off.
         if not out and v[i] * v[i] > 2.0 * b_max[i] * (law.entry - s[i]):
-            narrowest = beyond(floats, ints, road, law, first, lead, i)
+            narrowest = beyond(floats, ints, layout, law, first, lead, i)
 
         # From the junction on, also the last vehicle ahead bound for the same exit lane.
         # Both positions are measured from that lane, so a vehicle that is still on another arc
         # counts as if it were on this one.
         k = ahead[i]
         if i == front and ints[RELEASED, i]:
-            k = lanes[int(road.ends[p, 2])]["tail"]
+            k = lanes[int(layout.ends[p, 2])]["tail"]
         if k >= 0:
             rear = s[k] - length[k] - leave[k]
             other = rear - (s[i] - leave[i])
@@ -142,7 +142,7 @@ def near_junction(
             elif rear >= 0.0 and lead == k and (law.model == IDM or law.model == IIDM):
                 gap = min(gap, other)  # the same vehicle: the smaller gap decides everything
             else:
-                mine = road.types[ints[TYPE, i]]
+                mine = layout.types[ints[TYPE, i]]
                 closest = closeness(v[i], other, v[k], mine, law)
                 if rear >= 0.0:
                     room = room_behind(other, v[k], b_max[k], mine, law)
@@ -155,14 +155,14 @@ def near_junction(
 
 @njit_inner
 def beyond(
-    floats: Floats, ints: Ints, road: Layout, law: Law, first: int, stop: int, i: int
+    floats: Floats, ints: Ints, layout: Layout, law: Law, first: int, stop: int, i: int
 ) -> float:
     """The least room behind the vehicles from slot `first` to before `stop` on i's path."""
     narrowest = math.inf
-    p, mine = ints[PATH, i], road.types[ints[TYPE, i]]
+    p, mine = ints[PATH, i], layout.types[ints[TYPE, i]]
     for j in range(stop - 1, first - 1, -1):
         rear = floats[S, j] - floats[LENGTH, j]
-        if rear < road.branch[ints[PATH, j], p]:
+        if rear < layout.branch[ints[PATH, j], p]:
             gap = rear - floats[S, i]
             new = room_behind(gap, floats[V, j], floats[B_MAX, j], mine, law)
             narrowest = min(narrowest, new)
@@ -170,7 +170,7 @@ def beyond(
 
 
 @njit_inline
-def weigh(floats: Floats, ints: Ints, road: Layout, law: Law, n: int) -> bool:
+def weigh(floats: Floats, ints: Ints, layout: Layout, law: Law, n: int) -> bool:
     """What the leaders ask for; returns whether two vehicles overlap."""
     v, gap, lead_v, lead_b = floats[V], floats[GAP], floats[LEAD_V], floats[LEAD_B]
     z, room, b_max = floats[CLOSENESS], floats[ROOM], floats[B_MAX]
@@ -190,11 +190,11 @@ def weigh(floats: Floats, ints: Ints, road: Layout, law: Law, n: int) -> bool:
         for i in range(n):
             z[i] = closest[i]
             if gap[i] < math.inf:
-                mine = road.types[ints[TYPE, i]]
+                mine = layout.types[ints[TYPE, i]]
                 z[i] = max(z[i], closeness(v[i], gap[i], lead_v[i], mine, law))
     if law.semi_implicit or law.mixed:
         for i in range(n):
-            room[i] = room_behind(gap[i], lead_v[i], lead_b[i], road.types[ints[TYPE, i]], law)
+            room[i] = room_behind(gap[i], lead_v[i], lead_b[i], layout.types[ints[TYPE, i]], law)
     else:  # `room_behind` with equal brakes
         for i in range(m):
             room[i] = 2.0 * b_max[i] * (gap[i] - law.room) + lead_v[i] * lead_v[i]
@@ -205,7 +205,7 @@ def weigh(floats: Floats, ints: Ints, road: Layout, law: Law, n: int) -> bool:
 
 @njit_inline
 def choose(
-    floats: Floats, ints: Ints, vehicles: Records, lanes: Records, road: Layout, law: Law, n: int
+    floats: Floats, ints: Ints, vehicles: Records, lanes: Records, layout: Layout, law: Law, n: int
 ) -> None:
     """The acceleration that the law, the limits and the hold line allow."""
     flag = floats[FLAG]
@@ -228,17 +228,17 @@ def choose(
             flag[i] = 1.0
     for i in range(n):
         if flag[i] != 0.0:
-            careful(floats, ints, vehicles, lanes, road, law, i)
+            careful(floats, ints, vehicles, lanes, layout, law, i)
 
 
 @njit_inline
 def careful(
-    floats: Floats, ints: Ints, vehicles: Records, lanes: Records, road: Layout, law: Law, i: int
+    floats: Floats, ints: Ints, vehicles: Records, lanes: Records, layout: Layout, law: Law, i: int
 ) -> None:
     """`choose` for a vehicle that may have to slow down, or has an advised speed."""
     s, v, z, p = floats[S, i], floats[V, i], floats[CLOSENESS, i], ints[PATH, i]
-    me, mine = vehicles[ints[ROW, i]], road.types[ints[TYPE, i]]
-    start, speed = road.section_start, road.section_speed
+    me, mine = vehicles[ints[ROW, i]], layout.types[ints[TYPE, i]]
+    start, speed = layout.section_start, layout.section_speed
     acc = drive(v, floats[LIMIT, i], me["advice"], z, mine, law)
     k = ints[SECTION, i] + 1
     while braking_begins(v, start[p, k] - s, mine, law):
@@ -251,18 +251,18 @@ def careful(
     first = lanes[ints[LANE, i]]["slot"]
     front = first + lanes[ints[LANE, i]]["entered"]
     if i > front and v * v > 2.0 * mine.b_max * (law.entry - s):
-        room = min(floats[ROOM, i], beyond(floats, ints, road, law, first, front, i))
-        k = lanes[int(road.ends[p, 2])]["tail"]
+        room = min(floats[ROOM, i], beyond(floats, ints, layout, law, first, front, i))
+        k = lanes[int(layout.ends[p, 2])]["tail"]
         if ints[RELEASED, i] and k >= 0:
-            rear = floats[S, k] - floats[LENGTH, k] - road.ends[ints[PATH, k], 0]
-            gap = rear - (s - road.ends[p, 0])
+            rear = floats[S, k] - floats[LENGTH, k] - layout.ends[ints[PATH, k], 0]
+            gap = rear - (s - layout.ends[p, 0])
             if rear >= 0.0:
                 room = min(room, room_behind(gap, floats[V, k], floats[B_MAX, k], mine, law))
         floats[ROOM, i] = room
 
 
 @njit_inline
-def keep_rooms(floats: Floats, ints: Ints, road: Layout, law: Law, n: int) -> None:
+def keep_rooms(floats: Floats, ints: Ints, layout: Layout, law: Law, n: int) -> None:
     """Brake harder where the room behind a leader asks for it."""
     v, acc, room, b_max, flag = floats[V], floats[ACC], floats[ROOM], floats[B_MAX], floats[FLAG]
     for i in range(padded(n)):
@@ -271,7 +271,7 @@ def keep_rooms(floats: Floats, ints: Ints, road: Layout, law: Law, n: int) -> No
         flag[i] = 1.0 if top * (top + 2.0 * b_max[i] * law.dt) > room[i] else 0.0
     for i in range(n):
         if flag[i] != 0.0:
-            mine = road.types[ints[TYPE, i]]
+            mine = layout.types[ints[TYPE, i]]
             acc[i] = min(acc[i], keep_room(v[i], room[i], mine, law))
 
 

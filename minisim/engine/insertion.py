@@ -14,7 +14,7 @@ from minisim.laws import STOP_MARGIN, Law, insertable, room_behind
 
 @njit_inner
 def insert(
-    floats: Floats, ints: Ints, vehicles: Records, lanes: Records, road: Layout, law: Law,
+    floats: Floats, ints: Ints, vehicles: Records, lanes: Records, layout: Layout, law: Law,
     cruise: Cruise | None, tick: int,
 ) -> bool:  # fmt: skip
     """Insert the next vehicle that is due on each lane, if the gap allows it; none is dropped.
@@ -30,18 +30,18 @@ def insert(
         i = lanes[lane]["next"]
         if i == lanes[lane]["end"] or vehicles[i]["demand_tick"] > tick:
             continue
-        if cruise is not None and blocked(vehicles, road, law, cruise, lane):
+        if cruise is not None and blocked(vehicles, layout, law, cruise, lane):
             continue
-        mine, p = road.types[vehicles[i]["type"]], vehicles[i]["path"]
-        s = road.ends[p, 3] + mine.length + law.margin
+        mine, p = layout.types[vehicles[i]["type"]], vehicles[i]["path"]
+        s = layout.ends[p, 3] + mine.length + law.margin
         section = 0
-        while s >= road.section_start[p, section + 1]:
+        while s >= layout.section_start[p, section + 1]:
             section += 1
         factor = vehicles[i]["factor"]
-        v = road.section_speed[p, section] * factor
-        for k in range(section + 1, road.section_start.shape[1] - 1):
-            room = max(road.section_start[p, k] - s, 0.0)
-            v = min(v, math.sqrt((road.section_speed[p, k] * factor) ** 2 + 2.0 * mine.b * room))
+        v = layout.section_speed[p, section] * factor
+        for k in range(section + 1, layout.section_start.shape[1] - 1):
+            room = max(layout.section_start[p, k] - s, 0.0)
+            v = min(v, math.sqrt((layout.section_speed[p, k] * factor) ** 2 + 2.0 * mine.b * room))
         # It must be able to stop before the junction, where other vehicles may be.
         v = min(v, law.depart_speed, math.sqrt(2.0 * mine.b_max * max(law.entry - s, 0.0)))
         if lanes[lane]["open"] == 0:
@@ -60,8 +60,8 @@ def insert(
         vehicles[i]["v"] = v
         vehicles[i]["depart_tick"] = tick
         vehicles[i]["section"] = section
-        while s >= road.marks[vehicles[i]["mark"]]:
+        while s >= layout.marks[vehicles[i]["mark"]]:
             vehicles[i]["mark"] += 1
             passed = True
-        admit(floats, ints, vehicles, lanes, road, law, i)
+        admit(floats, ints, vehicles, lanes, layout, law, i)
     return passed

@@ -42,7 +42,7 @@ def advance(
     ints: Ints,
     vehicles: Records,
     lanes: Records,
-    road: Layout,
+    layout: Layout,
     law: Law,
     cruise: Cruise | None,
     trace: Records,
@@ -65,13 +65,13 @@ def advance(
         The tick reached, the reasons (bits, 0 at `until`), and the numbers of lines recorded and
         vehicles observed.
     """
-    braking = heed(floats, ints, vehicles, lanes, road, law)
+    braking = heed(floats, ints, vehicles, lanes, layout, law)
     reasons = 0
     while tick < until and reasons == 0:
-        reasons = step(floats, ints, vehicles, lanes, road, law, cruise, bodies, braking, tick)
+        reasons = step(floats, ints, vehicles, lanes, layout, law, cruise, bodies, braking, tick)
         tick += 1
         if law.record_from <= tick < law.record_to:
-            traced = record(floats, ints, lanes, road, law, trace, traced, tick)
+            traced = record(floats, ints, lanes, layout, law, trace, traced, tick)
             if traced + lanes[-1]["end"] > len(trace):
                 reasons |= TRACE_FULL
     return tick, reasons, traced, observe(floats, ints, vehicles, lanes, law, observed)
@@ -83,7 +83,7 @@ def step(
     ints: Ints,
     vehicles: Records,
     lanes: Records,
-    road: Layout,
+    layout: Layout,
     law: Law,
     cruise: Cruise | None,
     bodies: Floats,
@@ -92,20 +92,20 @@ def step(
 ) -> int:
     """Take one step, from `tick` to the next; returns the reasons to return, as bits."""
     reasons = 0
-    if insert(floats, ints, vehicles, lanes, road, law, cruise, tick):
+    if insert(floats, ints, vehicles, lanes, layout, law, cruise, tick):
         reasons |= MARKED
     if cruise is None:
-        overlap = accelerate(floats, ints, vehicles, lanes, road, law, braking)
+        overlap = accelerate(floats, ints, vehicles, lanes, layout, law, braking)
     else:
-        overlap = accelerate_cruising(vehicles, lanes, road, law, cruise)
+        overlap = accelerate_cruising(vehicles, lanes, layout, law, cruise)
         for i in range(count(lanes)):
             floats[ACC, i] = vehicles[ints[ROW, i]]["a"]
     if overlap:
         reasons |= GAP
-    reasons |= move(floats, ints, vehicles, lanes, road, law, tick + 1)
+    reasons |= move(floats, ints, vehicles, lanes, layout, law, tick + 1)
     if cruise is not None:
         store(floats, ints, vehicles, lanes)
-        if look(vehicles, lanes, road, law, cruise, tick + 1):
+        if look(vehicles, lanes, layout, law, cruise, tick + 1):
             reasons |= CLEAR
         for i in range(count(lanes) - 1, -1, -1):
             floats[S, i], floats[ACC, i] = vehicles[ints[ROW, i]]["s"], vehicles[ints[ROW, i]]["a"]
@@ -114,7 +114,7 @@ def step(
                 catch_up(vehicles, lanes)
     if law.wake_when_empty and reasons & (MARKED | CLEAR) and occupied(floats, ints, lanes, law):
         reasons &= ~(MARKED | CLEAR)
-    if may_touch(floats, ints, lanes, road, law, bodies):
+    if may_touch(floats, ints, lanes, layout, law, bodies):
         reasons |= TOUCH
     done = True
     for lane in range(len(lanes)):
@@ -136,7 +136,7 @@ def record(
     floats: Floats,
     ints: Ints,
     lanes: Records,
-    road: Layout,
+    layout: Layout,
     law: Law,
     trace: Records,
     traced: int,
@@ -145,7 +145,7 @@ def record(
     """Write one line for every vehicle in the recorded stretch; returns the count so far."""
     for i in range(count(lanes)):
         s = floats[S, i]
-        past = s - floats[LENGTH, i] - road.ends[ints[PATH, i], 0]
+        past = s - floats[LENGTH, i] - layout.ends[ints[PATH, i], 0]
         if s < law.record_start or past > law.record_past:
             continue
         line = trace[traced]

@@ -40,7 +40,13 @@ MARKED, CLEAR = 1, 2
 
 @njit_inline
 def move(
-    floats: Floats, ints: Ints, vehicles: Records, lanes: Records, road: Layout, law: Law, tick: int
+    floats: Floats,
+    ints: Ints,
+    vehicles: Records,
+    lanes: Records,
+    layout: Layout,
+    law: Law,
+    tick: int,
 ) -> int:
     """Move every vehicle by one step, add up waiting and loss; returns reasons to wake, as bits."""
     n = count(lanes)
@@ -55,23 +61,23 @@ def move(
     for i in range(n):
         happens |= s[i] >= event[i]
     if happens:
-        enter_sections(floats, ints, vehicles, road, n)
+        enter_sections(floats, ints, vehicles, layout, n)
     add_up(floats, n)
-    return happenings(floats, ints, vehicles, lanes, road, law, n, tick) if happens else 0
+    return happenings(floats, ints, vehicles, lanes, layout, law, n, tick) if happens else 0
 
 
 @njit_inline
-def enter_sections(floats: Floats, ints: Ints, vehicles: Records, road: Layout, n: int) -> None:
+def enter_sections(floats: Floats, ints: Ints, vehicles: Records, layout: Layout, n: int) -> None:
     """Note the limits of the sections that vehicles have entered."""
     for i in range(n):
         if floats[S, i] < floats[EVENT, i]:
             continue
         p, section = ints[PATH, i], ints[SECTION, i]
-        while floats[S, i] >= road.section_start[p, section + 1]:
+        while floats[S, i] >= layout.section_start[p, section + 1]:
             section += 1
         me = vehicles[ints[ROW, i]]
         ints[SECTION, i] = me["section"] = section
-        floats[LIMIT, i] = road.section_speed[p, section] * me["factor"]
+        floats[LIMIT, i] = layout.section_speed[p, section] * me["factor"]
 
 
 @njit_inline
@@ -89,7 +95,7 @@ def add_up(floats: Floats, n: int) -> None:
 
 @njit_inner
 def happenings(
-    floats: Floats, ints: Ints, vehicles: Records, lanes: Records, road: Layout, law: Law, n: int,
+    floats: Floats, ints: Ints, vehicles: Records, lanes: Records, layout: Layout, law: Law, n: int,
     tick: int,
 ) -> int:  # fmt: skip
     """Carry out what happens to the vehicles that have reached their `EVENT`."""
@@ -101,27 +107,27 @@ def happenings(
             continue
         row, p, lane = ints[ROW, i], ints[PATH, i], ints[LANE, i]
         me = vehicles[row]
-        while s >= road.marks[ints[MARK, i]]:
+        while s >= layout.marks[ints[MARK, i]]:
             ints[MARK, i] += 1
             reasons |= MARKED
         me["mark"] = ints[MARK, i]
         if s >= law.entry and row == lanes[lane]["front"]:
-            exit_arm = int(road.ends[p, 2])
+            exit_arm = int(layout.ends[p, 2])
             lanes[lane]["front"] = row + 1
             lanes[lane]["entered"] += 1
             me["ahead"], ints[AHEAD, i] = lanes[exit_arm]["last"], lanes[exit_arm]["tail"]
             lanes[exit_arm]["last"], lanes[exit_arm]["tail"] = row, i
-        leave = max(road.ends[p, 0] + floats[LENGTH, i], law.leave)
+        leave = max(layout.ends[p, 0] + floats[LENGTH, i], law.leave)
         if s >= law.entry and ints[CLEARED, i] == 0 and s >= leave:
             ints[CLEARED, i] = me["cleared"] = 1
             me["brake"] = floats[BRAKE, i] = math.inf
             if law.wake_on_clear:
                 reasons |= CLEAR
-        if s >= law.entry and s >= road.ends[p, 1] - law.margin:
+        if s >= law.entry and s >= layout.ends[p, 1] - law.margin:
             me["status"], me["arrival_tick"] = ARRIVED, tick
             arrived += 1
-        beware(floats, ints, vehicles, road, law, i)
-        expect(floats, ints, road, law, i)
+        beware(floats, ints, vehicles, layout, law, i)
+        expect(floats, ints, layout, law, i)
     for i in range(n - 1, -1, -1):
         if arrived and vehicles[ints[ROW, i]]["status"] == ARRIVED:
             dismiss(floats, ints, vehicles, lanes, i)

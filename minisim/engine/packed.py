@@ -43,10 +43,10 @@ ROW, LANE, PATH, TYPE, SECTION, MARK, AHEAD, CLEARED, RELEASED = range(9)
 INTS = 9
 
 
-def empty_pack(vehicles: Records, lanes: Records, road: Layout) -> tuple[Floats, Ints]:
+def empty_pack(vehicles: Records, lanes: Records, layout: Layout) -> tuple[Floats, Ints]:
     """Room for as many vehicles as fit on the roads, shapes (FLOATS, k) and (INTS, k)."""
-    shortest = min((it.length for it in road.types), default=1.0)
-    longest_queue = int((road.ends[:, 1] - road.ends[:, 3]).max() / shortest) + 2
+    shortest = min((it.length for it in layout.types), default=1.0)
+    longest_queue = int((layout.ends[:, 1] - layout.ends[:, 3]).max() / shortest) + 2
     most = min(len(vehicles), len(lanes) * longest_queue)
     width = (most + 7) // 8 * 8 + 8
     return np.ones((FLOATS, width)), np.zeros((INTS, width), np.int64)
@@ -70,14 +70,14 @@ def padded(n: int) -> int:
 
 @njit_inner
 def admit(
-    floats: Floats, ints: Ints, vehicles: Records, lanes: Records, road: Layout, law: Law, i: int
+    floats: Floats, ints: Ints, vehicles: Records, lanes: Records, layout: Layout, law: Law, i: int
 ) -> None:
     """Give row i, which has just been inserted on its lane, a slot behind the others there."""
     lane = vehicles[i]["lane"]
     at = lanes[lane]["slot"] + lanes[lane]["driving"]
     shift(floats, ints, lanes, lane, at, 1)
     me = vehicles[i]
-    mine, p = road.types[me["type"]], me["path"]
+    mine, p = layout.types[me["type"]], me["path"]
     ints[ROW, at], ints[LANE, at], ints[PATH, at], ints[TYPE, at] = i, lane, p, me["type"]
     ints[SECTION, at], ints[MARK, at] = me["section"], me["mark"]
     ints[AHEAD, at], ints[CLEARED, at] = -1, 0
@@ -87,16 +87,16 @@ def admit(
     floats[HEADWAY, at], floats[MIN_GAP, at] = mine.headway, mine.min_gap
     floats[ROOT, at] = 2.0 * math.sqrt(mine.a * mine.b)
     floats[WAITED, at], floats[LOST, at] = 0.0, 0.0
-    floats[LIMIT, at] = road.section_speed[p, me["section"]] * me["factor"]
+    floats[LIMIT, at] = layout.section_speed[p, me["section"]] * me["factor"]
     floats[RATIO, at] = me["v"] / floats[LIMIT, at]
     floats[CLOSEST, at], floats[NARROWEST, at] = 0.0, math.inf
     floats[REACH, at] = (mine.a + 2.0 * mine.b) * law.dt
-    floats[LEAVE, at] = road.ends[p, 0]
-    floats[AWAY, at] = road.ends[p, 0] + 2.0 * me["length"]
+    floats[LEAVE, at] = layout.ends[p, 0]
+    floats[AWAY, at] = layout.ends[p, 0] + 2.0 * me["length"]
     ints[RELEASED, at] = lanes[lane]["open"] != 0 or me["go"] != 0
     floats[BRAKE, at] = me["brake"]
-    beware(floats, ints, vehicles, road, law, at)
-    expect(floats, ints, road, law, at)
+    beware(floats, ints, vehicles, layout, law, at)
+    expect(floats, ints, layout, law, at)
 
 
 @njit_inner
@@ -160,7 +160,7 @@ def keep(floats: Floats, ints: Ints, vehicles: Records, i: int) -> None:
 
 @njit_inner
 def heed(
-    floats: Floats, ints: Ints, vehicles: Records, lanes: Records, road: Layout, law: Law
+    floats: Floats, ints: Ints, vehicles: Records, lanes: Records, layout: Layout, law: Law
 ) -> bool:
     """Take over what commands have changed; returns whether any vehicle is told to brake."""
     braking = False
@@ -172,15 +172,15 @@ def heed(
             ints[RELEASED, i] = is_open or me["go"] != 0
             floats[BRAKE, i] = me["brake"]
             braking |= me["brake"] != math.inf
-            beware(floats, ints, vehicles, road, law, i)
+            beware(floats, ints, vehicles, layout, law, i)
     return braking
 
 
 @njit_inline
-def beware(floats: Floats, ints: Ints, vehicles: Records, road: Layout, law: Law, i: int) -> None:
+def beware(floats: Floats, ints: Ints, vehicles: Records, layout: Layout, law: Law, i: int) -> None:
     """Note the first `s` ahead that may call for braking; minus infinity if that is anywhere."""
     s = floats[S, i]
-    care = road.section_start[ints[PATH, i], ints[SECTION, i] + 1]
+    care = layout.section_start[ints[PATH, i], ints[SECTION, i] + 1]
     if s < law.entry:
         # `hold` keeps a vehicle that stands 1 mm before its line where it is.
         care = min(care, law.entry if ints[RELEASED, i] else law.hold - STOP_MARGIN - 1e-3)
@@ -188,12 +188,12 @@ def beware(floats: Floats, ints: Ints, vehicles: Records, road: Layout, law: Law
 
 
 @njit_inner
-def expect(floats: Floats, ints: Ints, road: Layout, law: Law, i: int) -> None:
+def expect(floats: Floats, ints: Ints, layout: Layout, law: Law, i: int) -> None:
     """Note the next `s` at which something happens."""
     p = ints[PATH, i]
     leave, length = floats[LEAVE, i], floats[LENGTH, i]
-    event = min(road.section_start[p, ints[SECTION, i] + 1], road.marks[ints[MARK, i]])
-    event = min(event, road.ends[p, 1] - law.margin)
+    event = min(layout.section_start[p, ints[SECTION, i] + 1], layout.marks[ints[MARK, i]])
+    event = min(event, layout.ends[p, 1] - law.margin)
     if floats[S, i] < law.entry:
         event = min(event, law.entry)
     if ints[CLEARED, i] == 0:

@@ -3,6 +3,7 @@
 A corridor is the area that a vehicle's body sweeps on its way through the junction. Two movements
 conflict when their corridors come closer than `CLEARANCE`. The corridor of a fleet is that of all
 its types together: a short body swings out more in a turn than a long one, which cuts the corner.
+In shapes, m is the number of movements, and so of paths. Tables are cached and cannot be written.
 """
 
 from __future__ import annotations
@@ -49,14 +50,14 @@ class Areas(NamedTuple):
 
 
 def corridor(path: Path, vehicles: Vehicles) -> shapely.Geometry:
-    """The area that bodies sweep from when their front enters until their rear has left."""
+    """The area that bodies sweep from when their front enters until their rear has left [m]."""
     rows = [path.bodies(fronts(path, it), it) for it in vehicles.types]
     pairs = np.concatenate([np.concatenate([it[:-1], it[1:]], axis=1) for it in rows])
     return shapely.union_all(shapely.convex_hull(shapely.multipoints(pairs)))
 
 
 def bodies(path: Path, fronts: Floats, vehicle: VehicleType) -> Shapes:
-    """Bodies on a path with their fronts at the given `s`, shape (fronts,)."""
+    """Bodies on a path with their `fronts` at these `s` [m], as polygons; both have shape (k,)."""
     return np.asarray(shapely.polygons(path.bodies(fronts, vehicle)))
 
 
@@ -70,8 +71,9 @@ def corridors(intersection: Intersection, vehicles: Vehicles) -> Shapes:
 def separation(intersection: Intersection, vehicles: Vehicles, by_type: bool = False) -> Floats:
     """Distance [m] between the corridors of each pair of movements, shape (m, m).
 
-    0 where they overlap, and between movements from the same arm, which begin together. `by_type`
-    it is that of each pair of types and movements, shape (types·m, types·m), first type first.
+    0 where they overlap, and between movements from the same arm, which begin together. If
+    `by_type`, rows and columns are types and movements, shape (types·m, types·m): all movements of
+    the first type, then those of the second.
     """
     kinds: tuple[Vehicles, ...] = vehicles.types if by_type else (vehicles,)
     swept = np.concatenate([corridors(intersection, it) for it in kinds])
@@ -86,9 +88,12 @@ def conflicts(
     intersection: Intersection, vehicles: Vehicles, clearance: float = CLEARANCE,
     by_type: bool = False,
 ) -> Bools:  # fmt: skip
-    """Whether two movements come closer than `clearance` [m]; shapes as `separation`, symmetric."""
-    number("clearance [m]", clearance, low=0, high=10)
-    return _conflicts(intersection, vehicles, float(clearance), by_type)
+    """Whether two movements come within `clearance` [m]; symmetric, with the shape of `separation`.
+
+    Movements from the same arm always do. Raises `InputError` for a clearance that is not 0 … 10 m.
+    """
+    clearance = number("clearance [m]", clearance, low=0, high=10)
+    return _conflicts(intersection, vehicles, clearance, by_type)
 
 
 @lru_cache(maxsize=256)
@@ -162,8 +167,8 @@ def conflict_zones(
     """The conflict zones of all movements, shape (m, m, 2) [m], NaN where two do not conflict.
 
     `others` are the vehicles on the other paths, by default of the same type. A vehicle on path p
-    comes closer than `CLEARANCE` to corridor q only while its front bumper is
-    between `[p, q, 0]` and `[p, q, 1]` past the junction entry. Every zone ends when the rear has
+    comes closer than `CLEARANCE` to corridor q only while its front bumper is between `[p, q, 0]`
+    and `[p, q, 1]` past the junction entry. Every zone ends when the rear has
     left the junction. Two vehicles can touch only when both are in their zones.
 
     A zone reaches one tested body beyond the first and the last that are too close. If none is too
@@ -186,9 +191,9 @@ def conflict_zones(
 def clearing_distances(
     intersection: Intersection, vehicle: VehicleType, others: Vehicles | None = None
 ) -> Floats:
-    """How far past the entry a vehicle's front is when it has cleared another's way, (m, m) [m].
+    """How far past the entry a front bumper is when its vehicle has cleared another's way [m].
 
-    `others` are the vehicles on the other paths, by default of the same type.
+    The shape is (m, m); `others` are the vehicles on the other paths, by default of the same type.
 
     `[p, q]`: from here on, the body of a vehicle on movement q keeps `CLEARANCE` from the corridor
     of movement p. Minus infinity if the two do not conflict; infinite if that takes until the

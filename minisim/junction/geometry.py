@@ -18,7 +18,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from minisim.errors import InputError, instance, items, number, numbers
+from minisim.errors import InputError, instance, items, number, numbers, plural
 from minisim.fields import Takes
 from minisim.junction.movements import ARM_NAMES, Bools, Movement, Movements, movements_of
 from minisim.junction.paths import Bundle, Path, Way
@@ -50,7 +50,7 @@ def _bearings(name: str, value: Any) -> tuple[float, ...]:
     bearings = numbers(name.removesuffix(" [deg]"), value)
     n, most = len(bearings), len(ARM_NAMES)
     if not 3 <= n <= most:
-        raise InputError(f"an intersection has 3 … {most} arms, got {n} bearings")
+        raise InputError(f"an intersection has 3 … {most} arms, got {plural(n, 'bearing')}")
     for i, bearing in enumerate(bearings):
         number(f"bearing {i + 1} [deg]", bearing, low=0, below=360)
     if list(bearings) != sorted(bearings):
@@ -226,10 +226,20 @@ class Intersection:
         """The same of the shortest approach lane [m]."""
         return min(self.lengths[arm] for arm in self.approaches) - self.junction_radius
 
+    def too_short(self, needed: str) -> str:
+        """What messages say of the shortest road with an approach lane: how long it must be."""
+        arm = min(self.approaches, key=self.lengths.__getitem__)
+        own = self.roads is not None and self.roads[arm].length is not None
+        what = f"length [m] of the road of arm {ARM_NAMES[arm]}" if own else "arm_length [m]"
+        return f"{what} must be {needed}, got {self.lengths[arm]:g}"
+
     def refuse_roads(self, what: str) -> None:
         """Raise `InputError` if the approach lanes are not equally long, as `what` needs."""
         if self.shortest_approach < self.approach_length:
-            raise InputError(f"{what} counts metres from insertion: give all roads one length")
+            raise InputError(
+                f"{what} counts metres from insertion: give all roads one length, got "
+                f"{', '.join(f'{it:g}' for it in self.lengths)} m"
+            )
 
     def index(self, movement: Movement | str) -> int:
         """Position of a movement in `movements`; `InputError` if it does not exist."""

@@ -1,4 +1,7 @@
-"""Where movements of a lane part, and what a vehicle's place reveals about its manoeuvre."""
+"""Where movements of a lane part, and what a vehicle's place reveals about its manoeuvre.
+
+In shapes, m is the number of movements, and so of paths.
+"""
 
 from __future__ import annotations
 
@@ -115,7 +118,7 @@ def turning_room(intersection: Intersection, fleet: Fleet) -> float:
 
 @lru_cache(maxsize=64)
 def showing(intersection: Intersection, tolerance: float) -> Floats:
-    """Where a vehicle is first visibly not taking another manoeuvre of its lane, (m, m) [m].
+    """Where a vehicle is first visibly not taking another manoeuvre of its lane, shape (m, m) [m].
 
     `[p, q]`: from this far past the entry, the middle of the front bumper of a vehicle on path p
     is more than `tolerance` [m] off path q. Infinite for the same path, 0 between lanes.
@@ -130,7 +133,7 @@ def showing(intersection: Intersection, tolerance: float) -> Floats:
 
 
 def parting(intersection: Intersection, room: float) -> Floats:
-    """How far past the entry two movements of a lane are first `room` apart, shape (m, m) [m].
+    """How far past the entry two movements of a lane are first `room` [m] apart, shape (m, m) [m].
 
     The two vehicles compared have driven equally far. Infinite for a movement with itself, and for
     two that never get that far apart; minus infinity for movements of different lanes.

@@ -3,7 +3,8 @@
 A corridor (`minisim.junction.conflicts`) is the union of the hulls of each body on a path and the
 next. Each hull holds the line between the middles of its bumpers and lies close around the path. So
 most corridors conflict because these lines cross, or do not because the paths are far apart. Of the
-few others the hulls that are near each other are compared.
+few others the hulls that are near each other are compared. In shapes, m is the number of movements,
+and so of paths.
 """
 
 from __future__ import annotations
@@ -45,12 +46,15 @@ class Hulls(NamedTuple):
     half: Floats  #: half its length and half its width, shape (k, 2) [m]
 
     def of(self, which: Ints | Bools) -> Hulls:
-        """Some of them."""
+        """The hulls at some indices, or where a mask is true."""
         return Hulls(*(column[which] for column in self))
 
 
 def boxed(corners: Floats) -> Hulls:
-    """The hulls of corners; the box lies along the line from the third corner to the second."""
+    """The hulls of corners, shape (k, corners, 2) [m].
+
+    A box lies along the line from the third corner to the second, which must differ.
+    """
     heading = corners[:, 1] - corners[:, 2]
     heading = heading / np.hypot(*heading.T)[:, None]
     (x, y), (u, v) = np.moveaxis(corners, -1, 0), heading.T[..., None]
@@ -77,14 +81,17 @@ class Sweep(NamedTuple):
 
 
 def fronts(path: Path, vehicle: VehicleType) -> Floats:
-    """Where the front bumpers of a corridor's bodies are [m]: until the last rear has left."""
+    """`s` of the front bumpers of a corridor's bodies [m], shape (k,), `SWEEP_STEP` apart or less.
+
+    They lead from the entry to where the rear bumper has left.
+    """
     first, last = path.entry, path.exit + vehicle.length
     return np.linspace(first, last, math.ceil((last - first) / SWEEP_STEP) + 1)
 
 
 @lru_cache(maxsize=16)
 def sweep(intersection: Intersection, vehicle: VehicleType) -> Sweep:
-    """The bodies of a type on all paths."""
+    """The bodies of a type on all paths, at the `fronts` of each path."""
     each = [fronts(path, vehicle) for path in intersection.paths]
     path, s = np.repeat(np.arange(len(each)), list(map(len, each))), np.concatenate(each)
     bundle, first = intersection.bundle, np.flatnonzero(path[1:] == path[:-1])
@@ -100,8 +107,9 @@ def meeting(
 ) -> tuple[Bools, Bools]:
     """Whether two corridors are at most `clearance` [m] apart, and whether that is certain.
 
-    Rows of `pairs` are two indices of corridors: those of all movements for the first of `kinds`,
-    then for the second. Not certain are distances that differ from `clearance` by rounding alone.
+    Both have the shape (k,). Rows of `pairs`, shape (k, 2), are two indices of corridors: 0 … m−1
+    for the first of `kinds`, m … 2m−1 for the second, and so on. Not certain are distances that
+    differ from `clearance` by rounding alone (`ROUNDING`).
     """
     lines, rooms = zip(*(_trace(intersection, kind) for kind in kinds), strict=True)
     line, room, far = np.concatenate(lines), np.concatenate(rooms), clearance - 2.0 * COARSE
@@ -181,7 +189,10 @@ def _blocks(swept: Sweep) -> tuple[Hulls, Ints]:
 
 
 def least_gap(one: Hulls, other: Hulls, i: Ints, j: Ints) -> float:
-    """Smallest distance [m] between the hulls `one[i]` and `other[j]`; infinite without any."""
+    """Smallest distance [m] between the hulls `one[i]` and `other[j]`, for indices of shape (k,).
+
+    Infinite without any.
+    """
     inside, within = one.corners.mean(axis=1), other.corners.mean(axis=1)
     enough, best = float(np.hypot(*(inside[i] - within[j]).T).min(initial=math.inf)), math.inf
     apart = _apart(one, other, i, j, enough)
@@ -209,7 +220,7 @@ def _apart(one: Hulls, other: Hulls, i: Ints, j: Ints, enough: float) -> Floats:
 def boxes_apart(
     between: Floats, heading: Floats, others: Floats, half: Floats, its: Floats
 ) -> Floats:
-    """A lower bound of the distance between two boxes [m], at most 0 only if they overlap.
+    """A lower bound of the distance between two boxes [m], shape (...); ≤ 0 only if they overlap.
 
     They are given by the vector between their centres, their headings and half their lengths and
     widths, shapes (..., 2). They are as far apart as along each of their axes (the separating-axis
@@ -260,7 +271,10 @@ def _trace(
 
 
 def stretch(intersection: Intersection) -> Floats:
-    """How far a path leads per metre of `s`, at most, shape (m,): given lengths are rounded."""
+    """How far a path leads per metre of `s` at most [m/m], shape (m,).
+
+    That is 1, except where lengths are given and rounded.
+    """
     points = np.array([path.points for path in intersection.paths])
     steps = np.linalg.norm(np.diff(points, axis=1), axis=-1).max(axis=1)
     each = [path.crossing / (len(path.points) - 1) for path in intersection.paths]
@@ -302,7 +316,7 @@ def _most(swept: Sweep, values: Floats, paths: int) -> Floats:
 
 
 def swing(intersection: Intersection, vehicle: VehicleType) -> Floats:
-    """How far a point of a body moves at most per metre of its front bumper, shape (m,).
+    """How far a point of a body moves at most per metre of its front bumper [m/m], shape (m,).
 
     The ends of its chord c are on the path. So it turns by 2/c at most, and no point is farther
     from the chord than half the width and what the body is longer than c. With a rear axle it

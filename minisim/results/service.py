@@ -67,7 +67,7 @@ def service(run: Run, interval: float = 900.0, kind: str = "") -> pd.DataFrame:
     """
     import pandas as pd
 
-    number("interval [s]", interval, low=1, high=1e6)
+    interval = number("interval [s]", interval, low=1, high=1e6)
     trips, begin = run.counted.columns, float(run.scenario.warmup)
     edges = np.arange(begin, trips.end, interval)
     of = np.searchsorted(edges, trips.demand_time, side="right") - 1

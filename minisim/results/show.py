@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from html import escape
 from typing import TYPE_CHECKING, Any
 
+from minisim.errors import plural
 from minisim.results.metrics import MEANS, METRICS
 
 if TYPE_CHECKING:
@@ -45,16 +46,17 @@ def _html_row(name: str, means: Mapping[str, Any]) -> str:
 
 
 def _what(summary: Mapping[str, Any]) -> str:
-    short = {name: _short(summary[name]) for name in ("scenario", "controller", "profile")}
+    short = {name: _short(summary[name]) for name in ("scenario", "controller", "profile", "fleet")}
     return "{scenario}, {controller}: ".format_map(short) + conditions({**summary, **short})
 
 
-def conditions(summary: Mapping[str, Any]) -> str:
-    """Under which conditions a controller ran."""
+def conditions(summary: Mapping[str, Any], asked: str = "") -> str:
+    """Under which conditions a controller ran; `asked` is the inflow in another unit."""
     warmup = f" (warm-up {summary['warmup_s']:g} s)" if summary["warmup_s"] else ""
     host = "" if summary["host"] == "minisim" else f", host {summary['host']}"
     return (
-        f"{summary['density']:g} veh/h/lane, profile {summary['profile']}, "
+        f"{summary['density']:g} veh/h/lane{f' ({asked})' * bool(asked)}, "
+        f"profile {summary['profile']}, fleet {summary['fleet']}, "
         f"seed {summary['seed']}, {summary['horizon_s']:g} s{warmup}{host}"
     )
 
@@ -67,7 +69,8 @@ def spilled(summary: Mapping[str, Any]) -> str:
 
 
 def _trips(summary: Mapping[str, Any]) -> str:
-    return "{trips} trips, {unfinished} unfinished, {collisions} collisions".format_map(summary)
+    trips, collisions = plural(summary["trips"], "trip"), plural(summary["collisions"], "collision")
+    return f"{trips}, {summary['unfinished']} unfinished, {collisions}"
 
 
 def _number(value: float | None) -> str:

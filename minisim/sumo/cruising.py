@@ -53,8 +53,8 @@ class Cruiser(Steering):
     def __init__(self, job: Job, libsumo: Any, cruise: Cruise) -> None:
         super().__init__(job.law, libsumo)
         self._cruise, law = cruise, job.law
-        self._limit = job.road.section_speed[:, 0]
-        top = max(cruise.cruise_speed, job.road.section_speed.max())
+        self._limit = job.layout.section_speed[:, 0]
+        top = max(cruise.cruise_speed, job.layout.section_speed.max())
         b = cruise.type.b
         self.near = law.hold - STOP_MARGIN - 1.0 - (top + 4.0 * b * law.dt) ** 2 / (2.0 * b)
 

@@ -217,7 +217,7 @@ def _prepare(hosted: Hosted, options: _Options, folder: Path) -> Job:
         temporary=options.keep_files is None,
         model=model,
         plan=plan,
-        road=build_layout(site, plan),
+        layout=build_layout(site, plan),
         law=build_law(
             site, plan, depart_speed=depart_speed, record=hosted.record,
             record_window=hosted.record_window,

@@ -22,7 +22,7 @@ class Job(NamedTuple):
     temporary: bool  #: whether the process removes the folder if its caller is gone
     model: str  #: car-following model, one of `minisim.sumo.MODELS`
     plan: Plan  #: the session's
-    road: Layout
+    layout: Layout
     law: Law
     cruise: Cruise | None  #: see `minisim.engine.cruise.law.build_cruise`
     top_speed: float  #: no vehicle exceeds it [m/s]

@@ -114,8 +114,8 @@ class Follower(Steering):
         apart, exits = job.movements.apart, job.movements.exits
         crossed = apart & (exits[:, None] != exits)  # sharing neither lane nor exit
         self._crossing = [frozenset(np.flatnonzero(row).tolist()) for row in crossed]
-        self._exit = [(float(end[0]), int(end[2])) for end in job.road.ends]
-        self._branch = job.road.branch
+        self._exit = [(float(end[0]), int(end[2])) for end in job.layout.ends]
+        self._branch = job.layout.branch
         self._inside: list[Car] = []  # in the order in which they entered the junction
 
     def depart(self, car: Car) -> None:
@@ -209,7 +209,7 @@ class Follower(Steering):
 
 def limits(job: Job) -> list[tuple[list[float], list[float]]]:
     """Each path's sections as lists: their starts [m] and limits [m/s]."""
-    starts, speeds = job.road.section_start.tolist(), job.road.section_speed.tolist()
+    starts, speeds = job.layout.section_start.tolist(), job.layout.section_speed.tolist()
     return list(zip(starts, speeds, strict=True))
 
 

@@ -45,18 +45,18 @@ class Worker:
 
     def __init__(self, job: Job, libsumo: Any, caller: Channel) -> None:
         self._job, self._libsumo, self._caller = job, libsumo, caller
-        road, law = job.road, job.law
+        layout, law = job.layout, job.law
         self._steering: Steering = (
             Follower(job, libsumo) if job.cruise is None else Cruiser(job, libsumo, job.cruise)
         )
         self._limits = limits(job)
-        self._marks = road.marks.tolist()
-        self._exit, self._end, _, self._start = road.ends.T.tolist()
+        self._marks = layout.marks.tolist()
+        self._exit, self._end, _, self._start = layout.ends.T.tolist()
         self._stretch = [
             (leave - law.entry) / inside
             for leave, inside in zip(self._exit, job.network.inside, strict=True)
         ]
-        types = [Traits(*map(float, it)) for it in road.types]
+        types = [Traits(*map(float, it)) for it in layout.types]
         cars = (Car(row, record, types, law) for row, record in enumerate(job.vehicles))
         self._cars = {car.name: car for car in cars}
         recorded_from = law.record_start if law.record_from != NEVER else math.inf

@@ -53,7 +53,7 @@ class Arm(NamedTuple):
 
 
 def arms_of(town: Town, node: str) -> list[Arm]:
-    """The arms of a node.
+    """The arms of a node, in no order; `node` is one of `town.nodes`.
 
     An edge into the node and one out of it are one road if they lead to the same node or, as on a
     dual carriageway, leave at nearly the same angle. If several would do, the closest angles win.
@@ -113,7 +113,10 @@ def length_of(town: Town, edge: Edge, *, into: bool, most: float) -> float:
 
 
 def off_lane(points: Floats, start: Floats, outward: Floats) -> float:
-    """The largest distance of points from a straight lane from `start` outwards [m]."""
+    """The largest distance of points, shape (k, 2), from a straight lane [m].
+
+    The lane leads from `start`, shape (2,) [m], along the unit vector `outward`, shape (2,).
+    """
     apart = points - start
     return float(np.abs(apart[:, 0] * outward[1] - apart[:, 1] * outward[0]).max())
 

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from minisim.control import Site
-from minisim.errors import FileError, InputError, instance, show
+from minisim.errors import FileError, InputError, instance, plural, show
 from minisim.files import AnyPath
 from minisim.fleet import Fleet
 from minisim.junction.geometry import Intersection
@@ -98,10 +98,10 @@ def survey_of(path: AnyPath, node: str | None = None, side: str | None = None) -
         every = list(_surveys(town))
         possible = [it for it in every if it.intersection is not None]
         if len(possible) != 1:
-            raise InputError(
-                f"{path} has {len(possible)} of {len(every)} nodes that can be read; name one with "
-                "node (minisim junction --list names them)"
-            )
+            count, whole = len(possible), plural(len(every), "node")
+            told = f"{count} of its {whole} can be read; name one with node"
+            told = told if possible else f"none of its {whole} can be read"
+            raise InputError(f"{path}: {told} (minisim junction --list names them and says why)")
         found = possible[0]
     if found.intersection is None:
         raise InputError(f"node {found.node.id} of {path} cannot be read: {found.problem}")
@@ -143,10 +143,10 @@ def town_of(path: AnyPath, side: str | None = None) -> Town:
 
 
 def survey_node(town: Town, node: str) -> Survey:
-    """What the simulator makes of one node."""
+    """What the simulator makes of one node, which is one of `town.nodes`."""
     place, arms = town.nodes[node], arms_of(town, node)
     if len(arms) < 3:
-        problem = f"{len(arms) or 'no'} arm{'s' * (len(arms) != 1)} for cars; 3 are needed"
+        problem = f"{plural(len(arms), 'arm') if arms else 'no arms'} for cars; 3 are needed"
         return Survey(place, tuple(arms), None, problem)
     if len(arms) > len(ARM_NAMES):
         return Survey(place, tuple(arms), None, f"{len(arms)} arms; at most {len(ARM_NAMES)}")

@@ -15,7 +15,7 @@ from scenarios.cli.shared.options import option
 @app.command(
     epilog="Then: minisim run four-way --demand day.toml --horizon 3600 --lane-width 3.5\n\n"
     "A mapping says what a sheet does not say in usual words, such as\n\n"
-    "  start = 'from'\n\n"
+    "  start = 'begins'\n\n"
     "  arms = \\['North', 'East', 'South', 'West']\n\n"
     "  classes = { 'P&R' = 'bus' }"
 )

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from minisim.errors import InputError
+from minisim.errors import InputError, plural
 from scenarios.cli.shared import options
 from scenarios.cli.shared.app import app
 from scenarios.cli.shared.options import option
@@ -69,8 +69,9 @@ def figures(
                         raise
                     missing.append(f"{item.name}: {error}")
                 progress(done, len(items))
-    typer.echo(f"wrote {len(items) - len(missing)} figures and tables to {folder}")
+    drawn = plural(len(items) - len(missing), "figure or table", "figures and tables")
+    typer.echo(f"wrote {drawn} to {folder}")
     if left:
-        missing.append(f"{len(left)} others, which need runs: name a store with --store")
+        missing.append(f"{plural(len(left), 'other')}, which need runs: name a store with --store")
     for why in missing:
         typer.echo(f"  not {why}", err=True)

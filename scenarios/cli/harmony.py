@@ -52,6 +52,6 @@ def harmony(
         "harmony": matrix.values.astype(int).tolist(),
     }
     title = Text(f"{what.name}, {what.intersection.side}-hand traffic: ● harmony, · conflict")
-    if closed(what):
-        title.append(f"; no vehicle may take {', '.join(closed(what))}")
-    answer(as_json, facts, title, harmony_table(matrix))
+    if shut := closed(what):
+        title.append(f", – closed: no vehicle may take {', '.join(shut)}")
+    answer(as_json, facts, title, harmony_table(matrix, shut))

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from minisim.errors import InputError
+from minisim.errors import InputError, plural
 from scenarios.cli.shared import options
 from scenarios.cli.shared.app import app
 from scenarios.cli.shared.options import option
-from scenarios.cli.shared.terminal import bar, show, show_json
+from scenarios.cli.shared.terminal import bar, show, show_json, wrapped
 
 if TYPE_CHECKING:
-    from rich.table import Table
+    from rich.text import Text
 
     from minisim.town import Survey
 
@@ -80,25 +80,24 @@ def _facts(found: Survey) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _every(every: Sequence[Survey]) -> Table:
-    from rich import box
-    from rich.table import Table
+def _every(every: Sequence[Survey]) -> Text:
+    """Each node with its verdict, in lines of 80 columns."""
+    from rich.text import Text
 
-    table = Table(box=box.SIMPLE_HEAD)
-    for title in ("node", "type", "arms", "", "why, or how well"):
-        table.add_column(title, justify="right" if title == "arms" else "left")
+    lines = []
     for it in every:
-        row = it.node.id, it.node.kind, str(len(it.arms)), "yes" if it.intersection else "no"
-        table.add_row(*row, it.verdict, style="" if it.intersection else "dim")
-    return table
+        what = f"{it.node.id}, {it.node.kind}, {plural(len(it.arms), 'arm')}"
+        told = f"{'yes' if it.intersection else 'no':3}  {what}: {it.verdict}"
+        lines.append(Text(wrapped(told, 5), "" if it.intersection else "dim"))
+    return Text("\n").join(lines)
 
 
 def _count(every: Sequence[Survey]) -> str:
     possible = sum(it.intersection is not None for it in every)
     single = [it for it in every if it.single]
     return (
-        f"{possible} of {len(every)} nodes can be read; {len(single)} have 3 or more arms with one "
-        "lane per direction"
+        f"{possible} of {plural(len(every), 'node')} can be read; {len(single)} "
+        f"{'has' if len(single) == 1 else 'have'} 3 or more arms with one lane per direction"
     )
 
 
@@ -126,15 +125,16 @@ def _tell(found: Survey) -> None:
 
     made = found.intersection
     assert made is not None
-    table = Table(box=box.SIMPLE_HEAD)
+    table, rows = Table(box=box.SIMPLE_HEAD), _rows(found)
     for title in (
         "arm", "bearing [°]", "traffic", "length [m]", "limit [km/h]", "lanes [m]", "turns",
-        "edges", "street",
     ):  # fmt: skip
         table.add_column(title, justify="right" if title.endswith("]") else "left")
-    for row in _rows(found):
-        cells = [" ".join(it) if isinstance(it, list) else it for it in row.values()]
+    for row in rows:
+        cells = [" ".join(it) if isinstance(it, list) else it for it in (*row.values(),)[:7]]
         table.add_row(*(f"{it:g}" if isinstance(it, float) else str(it) for it in cells))
+    ways = [f"{row['arm']}: {' '.join(row['edges'])} {row['street']}".rstrip() for row in rows]
     what = Text.assemble((f"node {found.node.id}", "bold"), f" ({found.node.kind})")
     what.append(f": {made.side}-hand traffic, junction radius {made.junction_radius:g} m")
-    show(what, table, *(Text(f"  {note}") for note in found.verdict.split("; ")))
+    told = [*(f"edges of {way}" for way in ways), *found.verdict.split("; ")]
+    show(what, table, *(Text(f"  {wrapped(it, 4)}") for it in told))

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from minisim.errors import plural
 from scenarios.cli.shared import options
 from scenarios.cli.shared.app import app
 from scenarios.cli.shared.options import option
@@ -58,7 +59,7 @@ def reproduce(
             with bar(f"simulating {name}") as progress:
                 done = make(name, effort, rows, workers, progress)
             made.append(done)
-            took = f"{done.computed} of {done.runs} runs computed in {done.wall_s:.0f} s"
+            took = f"{done.computed} of {plural(done.runs, 'run')} computed in {done.wall_s:.0f} s"
             failed = f", {len(done.failed)} failed" if done.failed else ""
             typer.echo(f"{name}: {took}{failed}", err=True)
         if rows.outdated:
@@ -66,7 +67,8 @@ def reproduce(
         with bar("drawing") as progress:
             archive = Archive(find_in(rows), effort)
             files = write_report(archive, made, workers, folder, progress, parts=names)
-    typer.echo(f"wrote {files} figures and tables to {folder / 'figures'}")
+    drawn = plural(files, "figure or table", "figures and tables")
+    typer.echo(f"wrote {drawn} to {folder / 'figures'}")
     typer.echo(f"wrote {folder / 'report.md'}")
     if broken := sum(len(part.failed) for part in made):
-        typer.echo(f"{broken} runs failed; the report names them", err=True)
+        typer.echo(f"{plural(broken, 'run')} failed; the report says which", err=True)

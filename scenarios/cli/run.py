@@ -62,6 +62,7 @@ def run(
 ) -> None:  # fmt: skip
     """Simulate one run: waiting, travel and delay by lane, and how safe it is."""
     from minisim.files import check_apart, check_file, check_table
+    from minisim.pcu import UNITS
     from minisim.results.metric import GROUPS
     from minisim.results.metrics import SAFETY, asked_metrics
     from minisim.results.trajectories import write_fcd, write_trajectories, write_trips
@@ -125,8 +126,10 @@ def run(
         show_json(summary)
         return
     from scenarios.cli.shared import report
+    from scenarios.library import DENSITY
 
-    show(*report.run_parts(summary, asked, by, result.counts))
+    inflow = f"{DENSITY if density is None else density:g} {unit}/h/lane" if unit in UNITS else ""
+    show(*report.run_parts(summary, asked, by, result.counts, inflow))
     for collision in result.collisions[:10]:
         typer.echo(f"  {collision}")
     for path in files:

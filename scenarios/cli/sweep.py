@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from minisim.errors import InputError, choice, integer, number
+from minisim.errors import InputError, choice, integer, number, plural
 from scenarios.cli.shared import options
 from scenarios.cli.shared.app import app
 from scenarios.cli.shared.options import option
@@ -108,7 +108,7 @@ def sweep(
         outdated = store.outdated
     averaged = cells(rows)
     show(sweep_table(averaged, experiments), sweep_notes(rows, averaged, experiments))
-    typer.echo(f"  {len(rows)} runs in {out}")
+    typer.echo(f"  {plural(len(rows), 'run')} in {out}")
     if outdated:
         typer.echo(f"  {outdated}")
     if export is not None:
@@ -151,11 +151,11 @@ def _run(
             for k, row in finished(experiments, executor, jobs=jobs, store=store):
                 rows[k] = row
                 lost += row["error"] is not None
-                progress.label(f"{len(rows)} of {total} runs, {lost} failed")
+                progress.label(f"{len(rows)} of {plural(total, 'run')}, {lost} failed")
                 progress(len(rows), total)
     except (KeyboardInterrupt, Terminated):
         kept = len(store.valid(map(key_of, experiments)))
-        note = f"{kept} of {total} runs are in {out}; repeat the command to continue"
+        note = f"{kept} of {plural(total, 'run')} are in {out}; repeat the command to continue"
         typer.echo(f"minisim: {note}", err=True)
         raise
     return pd.DataFrame([rows[k] for k in range(total)])

@@ -8,6 +8,7 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from minisim.errors import plural
 from minisim.files import markdown_table, write_table, write_text
 from minisim.version import __version__
 from scenarios.crossval.cases import Case
@@ -80,18 +81,19 @@ def summary(results: Sequence[Result]) -> str:
     verdicts = [agree for result in results if (agree := result.hosts_agree) is not None]
     text = "no cell could be compared"
     if verdicts:
-        text = f"{sum(verdicts)} of {len(verdicts)} cells: both hosts agree within the tolerances"
+        all_cells = plural(len(verdicts), "cell")
+        text = f"{sum(verdicts)} of {all_cells}: both hosts agree within the tolerances"
     for host, name in (("minisim", "minisim"), ("sumo", "SUMO")):
         judged = [met for result in results if (met := result.meets_paper(host)) is not None]
         if judged:
             text += f"; {name} meets the paper in {sum(judged)} of {len(judged)}"
     uncompared = len(results) - len(verdicts)
     if verdicts and uncompared:
-        text += f"; {_counted(uncompared, 'cell')} could not be compared"
+        text += f"; {plural(uncompared, 'cell')} could not be compared"
     if few := sum(result.few for result in results):
-        text += f"; {_counted(few, 'verdict')} over fewer than {FEW} trips"
+        text += f"; {plural(few, 'verdict')} over fewer than {FEW} trips"
     failed = sum(len(result.failures) for result in results)
-    return text + (f"; {_counted(failed, 'run')} failed" if failed else "")
+    return text + (f"; {plural(failed, 'run')} failed" if failed else "")
 
 
 def _rows(result: Result) -> Iterator[dict[str, Any]]:
@@ -251,10 +253,6 @@ def _number(value: float | None, digits: int = 2) -> str:
 
 def _share(value: float) -> str:
     return NOTHING if math.isnan(value) else f"{100 * value:.1f} %"
-
-
-def _counted(count: int, thing: str) -> str:
-    return f"{count} {thing}{'' if count == 1 else 's'}"
 
 
 def _yes(value: bool | None) -> str:

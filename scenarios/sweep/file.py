@@ -50,11 +50,11 @@ from minisim.errors import (
 )
 from minisim.files import read_file
 from minisim.inflow import MAX_TIME
-from minisim.recorded import read_arrivals
-from scenarios.controllers import controller_named
+from minisim.parameters import parameters
+from scenarios.controllers import CONTROLLERS, controller_named
 from scenarios.defaults import AXES, CUSTOM, SINGLE
 from scenarios.junctions import is_junction_file
-from scenarios.library import DRAWN, refuse_beside, scenario_named
+from scenarios.library import DRAWN, refuse_beside, replayed, scenario_named
 from scenarios.loading import metrics_named
 from scenarios.recipe import Recipe
 from scenarios.scenario import Scenario
@@ -184,8 +184,8 @@ def _scenario(chosen: dict[str, Any], folder: Path) -> Scenario:
     made = scenario_named(**junction, **chosen)
     if recorded is not None:
         instance("arrivals", recorded, str)
-        recorded = read_arrivals(folder / recorded, made.intersection.n, start or 0.0)
-    return replace(made, recorded=recorded, name=label or made.name)
+        made = replayed(made, folder / recorded, start)
+    return replace(made, name=label or made.name)
 
 
 def _table(given: object) -> dict[str, Any]:
@@ -219,8 +219,24 @@ def _seeds(value: object) -> list[int]:
 
 
 def _check_keys(what: str, table: Iterable[str], known: Iterable[str]) -> None:
+    """Raise `InputError` for an unknown key; it says where one belongs that is known elsewhere."""
     for key in table:
+        if key not in known and (home := _home(key)):
+            raise InputError(f"unknown {what} {key!r}; {home}")
         choice(what, key, known)
+
+
+def _home(key: str) -> str:
+    """Where in a file a key belongs; empty if nowhere."""
+    if key in (*AXES, *SINGLE):
+        return f"it belongs on a line of its own: {key} = …"
+    if key in JUNCTION:
+        return f'it belongs to the scenario: scenario = {{ name = "four-way", {key} = … }}'
+    makers: dict[str, Any] = {name: entry.make for name, entry in CONTROLLERS.items()}
+    for name, make in makers.items():
+        if any(it.name == key for it in parameters(make)):
+            return f'it belongs to a controller: controller = {{ name = "{name}", {key} = … }}'
+    return ""
 
 
 def _check_names(recipes: Iterable[Recipe]) -> None:

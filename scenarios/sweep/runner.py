@@ -11,7 +11,7 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
-from minisim.errors import ExecutorError, InputError, instance, integer, show
+from minisim.errors import ExecutorError, InputError, instance, integer, plural, show
 from minisim.results.metrics import Asked
 from scenarios.loading import metrics_named
 from scenarios.recipe import Recipe
@@ -119,8 +119,8 @@ def finished(
             yield k, outcome.row
     if store is not None and lost:
         raise ExecutorError(
-            f"the executor gave up {lost} of {len(todo)} runs; the others are in {store.path}, "
-            "and the same sweep goes on from there"
+            f"the executor gave up {lost} of {plural(len(todo), 'run')}; the others are in "
+            f"{store.path}, and the same sweep goes on from there"
         )
 
 

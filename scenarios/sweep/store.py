@@ -17,7 +17,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
-from minisim.errors import FileError, instance, show
+from minisim.errors import FileError, instance, plural, show
 from scenarios.recipe import Recipe
 from scenarios.sweep.keys import description_of, digest_of, results_version
 from scenarios.sweep.rows import Outcome, Row
@@ -105,7 +105,7 @@ class Store:
     def outdated(self) -> str:
         """How many rows of other versions of the results there are, in words; empty if none."""
         ((count,),) = self._select("count(*)", "WHERE version != ?")
-        rows = "1 row" if count == 1 else f"{count} rows"
+        rows = plural(count, "row")
         told = f"{self.path} also keeps {rows} of another version of minisim, not used here"
         return told if count else ""
 

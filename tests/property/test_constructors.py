@@ -177,9 +177,14 @@ def test_any_argument_gives_an_object_or_a_minisim_error(name: str, data: st.Dat
 @pytest.mark.parametrize(
     ("name", "field"), [(name, field) for name, (_, valid) in CASES.items() for field in valid]
 )
-def test_integers_that_python_refuses_to_print_are_no_exception(name: str, field: str) -> None:
-    """`repr` of an integer of more than 4300 digits is a ValueError."""
-    for value in (10**5000, [10**5000], {"x": 10**5000}):
+def test_values_that_are_awkward_to_print_or_compare_are_no_exception(
+    name: str, field: str
+) -> None:
+    """`repr` of an integer of more than 4300 digits is a ValueError, a format of a fraction a
+    TypeError, and whether an array equals anything is an array.
+    """
+    huge, shares = 10**5000, (Fraction(1), Fraction(1, 3))
+    for value in (huge, [huge], {"x": huge}, *shares, list(shares), np.zeros(4), [np.zeros(4)]):
         try_to_make(name, {**CASES[name][1], field: value})
 
 

@@ -17,6 +17,7 @@ from dim.proofs.verification import (
     node_orders,
     preferred,
 )  # fmt: skip
+from minisim.errors import InputError
 from minisim.junction.movements import Movement
 from scenarios import regular
 
@@ -84,6 +85,13 @@ def test_the_claims_hold_with_given_priorities(order: str) -> None:
     assert analysis.priorities == (2, 3, 1, 0)
     assert {c.name for c in analysis.claims if not c.holds} <= {"largest"}
     assert analysis.holds == (order == "size")
+
+
+def test_a_closed_movement_must_exist() -> None:
+    """Of the 26 cases of three arms, those without a1 remain: 2 · 3 · 3 − 1."""
+    assert analyse(HarmonyMatrix.paper(3), closed=["a1"]).cases == 17
+    with pytest.raises(InputError, match="no movement 'a3'"):
+        analyse(HarmonyMatrix.paper(3), closed=["a3"])
 
 
 def test_ties_of_the_papers_255_cases() -> None:

@@ -19,7 +19,7 @@ TOLERANCE = 0.001
 
 
 @njit_inner
-def blocked(vehicles: Records, road: Layout, law: Law, cruise: Cruise, arm: int) -> bool:
+def blocked(vehicles: Records, layout: Layout, law: Law, cruise: Cruise, arm: int) -> bool:
     """Whether a vehicle arriving on an arm keeps others from being inserted there.
 
     Where the road leads back, SUMO assumes that the vehicle at its end might turn, and keeps room
@@ -31,14 +31,14 @@ def blocked(vehicles: Records, road: Layout, law: Law, cruise: Cruise, arm: int)
     while vehicles[i]["ahead"] >= 0 and vehicles[vehicles[i]["ahead"]]["status"] == DRIVING:
         i = vehicles[i]["ahead"]
     first = vehicles[i]
-    rest = road.ends[first["path"], 1] - first["s"]
+    rest = layout.ends[first["path"], 1] - first["s"]
     needed = braking_distance(first["v"], cruise.type.b_max, law.dt) + REACTION * first["v"]
     return bool(rest + TURNAROUND + law.margin - cruise.type.min_gap < needed)
 
 
 @njit_inner
 def look(
-    vehicles: Records, lanes: Records, road: Layout, law: Law, cruise: Cruise, tick: int
+    vehicles: Records, lanes: Records, layout: Layout, law: Law, cruise: Cruise, tick: int
 ) -> bool:
     """Note after a step which vehicles have entered the junction or an exit lane.
 
@@ -59,18 +59,18 @@ def look(
             p = vehicles[i]["path"]
             if mine["merged"] == 0 and vehicles[i]["s"] >= law.entry + cruise.waits[p, 0]:
                 mine["merged"] = tick
-            if mine["left"] == 0 and vehicles[i]["s"] >= road.ends[p, 0]:
+            if mine["left"] == 0 and vehicles[i]["s"] >= layout.ends[p, 0]:
                 mine["left"] = 1
-                exit_arm = int(road.ends[p, 2])
+                exit_arm = int(layout.ends[p, 2])
                 vehicles[i]["ahead"] = cruise.last[exit_arm]
                 cruise.last[exit_arm] = i
             if cruise.teleports and mine["left"] != 0 and vehicles[i]["status"] == DRIVING:
-                lost |= teleport(vehicles, road, cruise, i, tick)
+                lost |= teleport(vehicles, layout, cruise, i, tick)
     return lost
 
 
 @njit_inner
-def teleport(vehicles: Records, road: Layout, cruise: Cruise, i: int, tick: int) -> bool:
+def teleport(vehicles: Records, layout: Layout, cruise: Cruise, i: int, tick: int) -> bool:
     """Remove a vehicle that has run into the one ahead on its exit; return whether it has.
 
     SUMO's default answer to a collision. It counts as one if the gap is less than `min_gap`.
@@ -79,7 +79,7 @@ def teleport(vehicles: Records, road: Layout, cruise: Cruise, i: int, tick: int)
     j = vehicles[i]["ahead"]
     if j < 0 or vehicles[j]["status"] != DRIVING:
         return False
-    ends = road.ends
+    ends = layout.ends
     rear = vehicles[j]["s"] - cruise.type.length - ends[vehicles[j]["path"], 0]
     if rear - (vehicles[i]["s"] - ends[vehicles[i]["path"], 0]) >= cruise.type.min_gap - TOLERANCE:
         return False

@@ -149,7 +149,9 @@ def follow(v: float, gap: float, v_leader: float, law: Law, cruise: Cruise) -> f
 
 
 @njit_inner
-def allowed(s: float, v: float, p: int, v0: float, road: Layout, law: Law, cruise: Cruise) -> float:
+def allowed(
+    s: float, v: float, p: int, v0: float, layout: Layout, law: Law, cruise: Cruise
+) -> float:
     """The speed that a vehicle which obeys limits may drive [m/s].
 
     It takes its desired speed for a factor on the limit where it was one step before. So a limit
@@ -157,10 +159,10 @@ def allowed(s: float, v: float, p: int, v0: float, road: Layout, law: Law, cruis
     Source: `MSCFModel_CC::finalizeSpeed`, `MSLane::getVehicleMaxSpeed`.
     """
     before = s - v * law.dt
-    limit, turn = road.section_speed[p, 0], road.section_speed[p, 1]
+    limit, turn = layout.section_speed[p, 0], layout.section_speed[p, 1]
     if before < law.entry <= s:
         return float(v0 * turn / limit)
-    if before < road.ends[p, 0] <= s:
+    if before < layout.ends[p, 0] <= s:
         return float(min(v0 * limit / turn, cruise.max_speed))
     return v0
 

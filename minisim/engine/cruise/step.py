@@ -28,13 +28,13 @@ from minisim.vehicle import POSITION_EPS
 
 
 @njit_inner
-def accelerate(vehicles: Records, lanes: Records, road: Layout, law: Law, cruise: Cruise) -> bool:
+def accelerate(vehicles: Records, lanes: Records, layout: Layout, law: Law, cruise: Cruise) -> bool:
     """Choose every vehicle's acceleration from the present state; returns whether two overlap.
 
     All in one function for the reason given in `minisim.engine.kernel.accelerate`.
     """
     overlap = False
-    ends, mine = road.ends, cruise.type
+    ends, mine = layout.ends, cruise.type
     inside = gather(vehicles, lanes, ends, law, cruise)
     for lane in range(len(lanes)):
         is_open = lanes[lane]["open"] != 0
@@ -46,11 +46,11 @@ def accelerate(vehicles: Records, lanes: Records, road: Layout, law: Law, cruise
             s, v, p = me["s"], me["v"], me["path"]
             v0 = cruise.cruise_speed if me["advice"] == math.inf else me["advice"]
             if law.model == KRAUSS:
-                u = free(me, road, law, cruise)
+                u = free(me, layout, law, cruise)
             else:
                 u = cruise_control(v, v0, cruise.cruise_gain, cruise.a, cruise.b)
             if cruise.obeys:
-                u = min(u, (allowed(s, v, p, v0, road, law, cruise) - v) / law.dt)
+                u = min(u, (allowed(s, v, p, v0, layout, law, cruise) - v) / law.dt)
             nearest = own = tail = math.inf
             part = 2  # of its way that the leader is on, see `Ahead`
             leave = ends[p, 0]
@@ -119,7 +119,7 @@ def accelerate(vehicles: Records, lanes: Records, road: Layout, law: Law, cruise
                     least = min(v + u * law.dt, (to_wait + POSITION_EPS) / law.dt)
                     a = max(a, (least - v) / law.dt)
             a = min(a, max(me["brake"], -v / law.dt))
-            cruise.memory[i]["fastest"] = FASTEST * v0 / road.section_speed[p, me["section"]]
+            cruise.memory[i]["fastest"] = FASTEST * v0 / layout.section_speed[p, me["section"]]
             if held and cruise.obeys:
                 if s + (v + a * law.dt) * law.dt >= law.entry:
                     a = -v / law.dt
@@ -131,10 +131,10 @@ def accelerate(vehicles: Records, lanes: Records, road: Layout, law: Law, cruise
 
 
 @njit_inner
-def free(me: np.void, road: Layout, law: Law, cruise: Cruise) -> float:
+def free(me: np.void, layout: Layout, law: Law, cruise: Cruise) -> float:
     """The acceleration of a vehicle that nothing hinders, within the limits here and ahead."""
     s, v, p, section, factor = me["s"], me["v"], me["path"], me["section"], me["factor"]
-    start, speed = road.section_start, road.section_speed
+    start, speed = layout.section_start, layout.section_speed
     acc = follow_law(v, min(speed[p, section] * factor, me["advice"]), 0.0, cruise.type, law)
     k = section + 1
     while braking_begins(v, start[p, k] - s, cruise.type, law):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -113,8 +112,7 @@ def build_scenario(
 ) -> Scenario:
     """The scenario that the options describe; None means not given."""
     from minisim.demandfile import read_demand
-    from minisim.recorded import read_arrivals
-    from scenarios.library import refuse_beside, scenario_named
+    from scenarios.library import refuse_beside, replayed, scenario_named
 
     given = {key: value for key, value in more.items() if value is not None}
     drawn = [f"--{key}" for key in ("density", "split", "turns", "unit") if key in given]
@@ -128,10 +126,7 @@ def build_scenario(
         raise InputError("--start needs --arrivals or --demand: it is a time of day there")
     made = scenario_named(name, None if bearings is None else _bearings(bearings), **given)
     say_replaced([made])
-    if file is None:
-        return made
-    recorded = read_arrivals(file, made.intersection.n, start or 0.0)
-    return replace(made, recorded=recorded)
+    return made if file is None else replayed(made, file, start)
 
 
 def _bearings(text: str) -> list[float]:

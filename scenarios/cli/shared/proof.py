@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from itertools import compress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -12,6 +12,7 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
+from minisim.errors import plural
 from minisim.files import check_file
 from minisim.junction.conflicts import CLEARANCE
 from minisim.junction.movements import ARM_NAMES
@@ -102,8 +103,7 @@ def analysis_text(analysis: Analysis) -> Text:
         f"(no graph of {analysis.n} nodes has more than {most_cliques(analysis.n)})",
     )  # fmt: skip
     for size, (first, count) in analysis.worst.items():
-        cases = "1 case" if count == 1 else f"{count} cases"
-        text.append(f"\n{'':29}of size {size}: {cases}, such as {_spaced(first)}")
+        text.append(f"\n{'':29}of size {size}: {plural(count, 'case')}, such as {_spaced(first)}")
     return text
 
 
@@ -122,7 +122,9 @@ def protocol_text(name: str, search: Exploration, lassos: Sequence[Lasso | None]
     text.append("\nsafe         ", "dim")
     if search.unsafe:
         first = search.unsafe[0]
-        paths = f"\n{'':13}({len(search.unsafe)} such paths of {len(first)} events)"
+        paths = (
+            f"\n{'':13}({plural(len(search.unsafe), 'such path')} of {plural(len(first), 'event')})"
+        )
         text.append(*no).append(f": {_listed(first)}{paths}")
     else:
         text.append(*yes).append(": movements in conflict are never inside at once")
@@ -143,24 +145,27 @@ def protocol_text(name: str, search: Exploration, lassos: Sequence[Lasso | None]
     return text
 
 
-def harmony_table(matrix: HarmonyMatrix) -> Table:
-    """The matrix with one column per lane: ● harmony, · conflict."""
+def harmony_table(matrix: HarmonyMatrix, shut: Collection[str] = ()) -> Table:
+    """The matrix with one column per lane: ● harmony, · conflict, – a movement that is `shut`."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     table.add_column("")
     manoeuvres = range(1, matrix.n)
 
-    def mark(harmony: bool, manoeuvre: int) -> Text:
-        text = f"{'●' if harmony else '·':<{len(str(manoeuvre)) + 2}}"
-        return Text(text, style="green" if harmony else "dim")
+    def mark(sign: str, manoeuvre: int) -> Text:
+        return Text(f"{sign:<{len(str(manoeuvre)) + 2}}", "green" if sign == "●" else "dim")
 
     for lane in ARM_NAMES[: matrix.n]:
         table.add_column(" ".join(f"{lane}{j}" for j in manoeuvres), no_wrap=True)
-    for movement, values in zip(matrix.movements, matrix.values, strict=True):
-        cells = [Text(str(movement), style="bold")]
-        for first in range(0, len(values), matrix.n - 1):
-            part = values[first:].tolist()
-            cells.append(Text("").join(map(mark, part, manoeuvres)))
-        table.add_row(*cells, end_section=movement.manoeuvre == matrix.n - 1)
+    known = [str(movement) in shut for movement in matrix.movements]
+    for movement, values in zip(matrix.movements, matrix.values.tolist(), strict=True):
+        signs = [
+            "–" if str(movement) in shut or gone else "●" if harmony else "·"
+            for gone, harmony in zip(known, values, strict=True)
+        ]
+        parts = range(0, len(signs), matrix.n - 1)
+        cells = [Text("").join(map(mark, signs[first:], manoeuvres)) for first in parts]
+        row = Text(str(movement), style="bold"), *cells
+        table.add_row(*row, end_section=movement.manoeuvre == matrix.n - 1)
     return table
 
 

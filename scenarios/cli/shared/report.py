@@ -10,6 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from minisim.clock import time_of_day
+from minisim.errors import plural
 from minisim.junction.movements import ARM_NAMES
 from minisim.results.metric import GROUPS, SPREAD, Metric
 from minisim.results.metrics import METRICS, asked_metrics, heading
@@ -38,11 +39,15 @@ APART = ("side", "fleet", "turns", "horizon_s", "warmup_s")
 
 
 def run_parts(
-    summary: Mapping[str, Any], metrics: Sequence[Metric], by: str, counts: Mapping[str, float]
-) -> Iterator[Text | Table]:
-    """What was run, its table, the `dim.senses.tally` counts, and metrics of the whole run."""
+    summary: Mapping[str, Any], metrics: Sequence[Metric], by: str, counts: Mapping[str, float],
+    inflow: str = "",
+) -> Iterator[Text | Table]:  # fmt: skip
+    """What was run, its table, the `dim.senses.tally` counts, and metrics of the whole run.
+
+    `inflow` says the inflow in the unit in which it was given, if that is not veh/h/lane.
+    """
     what = f"{summary['scenario']}, {summary['controller']}"
-    yield Text.assemble((what, "bold"), f": {conditions(summary)}")
+    yield Text.assemble((what, "bold"), f": {conditions(summary, inflow)}")
     yield _run_table(summary, metrics, by)
     if told := spilled(summary):
         yield Text(f"  {told}", "yellow")
@@ -164,7 +169,7 @@ def sweep_notes(rows: pd.DataFrame, cells: pd.DataFrame, experiments: Sequence[R
         what = f"{first['controller']}, {first['scenario']}, {first['density']:g} veh/h/lane"
         told = f"the first ({what}, seed {first['seed']}): {first['error']}"
         text.append("\n" if text else "")
-        text.append(f"  {len(failures)} of {len(rows)} runs failed; {told}", "red")
+        text.append(f"  {len(failures)} of {plural(len(rows), 'run')} failed; {told}", "red")
     return text
 
 
@@ -236,7 +241,7 @@ def count_parts(count: Count) -> Iterator[Text | Table]:
     facts = count_facts(count)
     yield Text.assemble(
         (count.name, "bold"), f": {facts['vehicles']:g} vehicles, {facts['from']}-{facts['until']},"
-        f" {facts['intervals']} intervals",
+        f" {plural(facts['intervals'], 'interval')}",
     )  # fmt: skip
     table = Table(box=box.SIMPLE_HEAD)
     table.add_column("lane")

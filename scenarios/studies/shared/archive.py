@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
-from minisim.errors import MinisimError
+from minisim.errors import MinisimError, plural
 from scenarios.studies import study_named
 from scenarios.studies.shared.effort import Effort
 from scenarios.studies.shared.points import Point
@@ -76,9 +76,9 @@ def missing_note(*results: Results, wanted: Callable[[Point], bool] = lambda _: 
 def _extent(runs: Sequence[Runs]) -> str:
     """The seeds per case, and how many runs there are if some are missing."""
     seeds = sorted({count.wanted for count in runs})
-    span = f"{seeds[0]} to {seeds[-1]} seeds" if len(seeds) > 1 else f"{seeds[0]} seeds"
+    span = f"{seeds[0]} to {seeds[-1]} seeds" if len(seeds) > 1 else plural(seeds[0], "seed")
     made, wanted = (sum(counts) for counts in zip(*runs, strict=True))
-    return span if made == wanted else f"{made} of {wanted} runs ({span} per case)"
+    return span if made == wanted else f"{made} of {plural(wanted, 'run')} ({span} per case)"
 
 
 def _listed(texts: Sequence[str], shown: int) -> str:

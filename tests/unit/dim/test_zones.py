@@ -7,9 +7,10 @@ import itertools
 
 import pytest
 
-from dim import Zones
+from dim import Dim, Zones
 from minisim.control import Site
 from minisim.errors import InputError
+from minisim.junction.roads import Road
 from scenarios import FAIR, PAPER, four_way
 
 KMH = 1 / 3.6
@@ -62,7 +63,9 @@ def test_markings_join_and_the_limit_holds_from_the_yellow_zone_on(
 def test_roads_must_hold_the_zones_before_an_inserted_vehicle() -> None:
     place = site()  # approach lanes of 492.8 m, vehicles of 4 m
     Zones(red=480.7).check(place)
-    with pytest.raises(InputError, match=r"leave only 488.8 m .* increase arm_length"):
+    with pytest.raises(
+        InputError, match=r"leaves only 488.8 m .*; arm_length .* at least .*, got 500"
+    ):
         Zones(red=481).check(place)
 
 
@@ -74,3 +77,11 @@ def test_a_held_vehicle_must_stand_in_the_yellow_zone() -> None:
     Zones(yellow=1.1).check(signals)
     with pytest.raises(InputError, match=r"must be more than 1 with SUMO's vehicles.*got 0\.9"):
         Zones(yellow=0.9).check(signals)
+
+
+def test_a_road_of_its_own_length_is_named() -> None:
+    """Not the length of the others."""
+    road = four_way(roads={"b": Road(length=30.0)})
+    with pytest.raises(InputError, match=r"; length \[m\] of the road of arm b must be at least 4"):
+        Dim().start(road.site(1))
+    Dim().start(four_way(roads={"b": Road(length=50.0)}).site(1))

@@ -64,3 +64,14 @@ def test_check_names_what_the_geometry_does_not_have() -> None:
     ]:
         with pytest.raises(InputError, match=message):
             table(lane, manoeuvre).check(3)
+
+
+def test_messages_tell_times_by_the_clock_of_the_whole_table() -> None:
+    """Also of a part of a part."""
+    table = Arrivals(np.array([25_300.0, 25_400.0]), np.array([0, 1]), np.array([1, 2]))
+    part = table.between(25_000.0, np.inf).between(200.0, 500.0)
+    assert part.time.tolist() == [100.0, 200.0]
+    closed = np.ones((3, 2), bool)
+    closed[1, 1] = False
+    with pytest.raises(InputError, match=r"vehicle of 25400 s \(07:03:20\) takes b2"):
+        part.check(3, closed)

@@ -71,7 +71,7 @@ def test_conflicts_leave_out_movements_of_one_arm() -> None:
                     FOUR.bearings, lane_width=6.0, junction_radius=20.0, arm_length=31.0
                 ),
             },
-            "no vehicle of 12 m can be inserted on approach lanes of 11 m; .* more than 32 m",
+            "no vehicle of 12 m can be inserted on an approach lane of 11 m; .* more than 32, got",
         ),
     ],
 )

@@ -71,6 +71,7 @@ def test_vehicle_types_of_ones_own_are_not_written(tmp_path: Path) -> None:
         ("start = 26100", 'start = "07:30"', "the period 07:00-07:15 leaves a hole before"),
         ("start = 26100", 'start = "25"', "overlaps"),
         ('"07:15"', '"seven"', "period 1: end must be a time of day such as 07:00 or seconds"),
+        ("\n[[period]]", "rates = [1]\n[[period]]", "unknown key 'rates'; it belongs to a period"),
         ("[[period]]", "[period]", "(not valid TOML|periods are written)"),
         ("[[period]]", "[[periods]]", "day.toml: unknown key 'periods'.*did you mean 'period'"),
         ("\n[[period]]", 'model = "gamma"\n[[period]]', "unknown arrival model 'gamma'"),

@@ -84,3 +84,9 @@ def test_every_error_is_a_minisim_error_and_bad_input_a_value_error() -> None:
     assert len(kinds) >= 6
     assert all(issubclass(kind, MinisimError) for kind in kinds)
     assert issubclass(InputError, ValueError)
+
+
+def test_things_agree_with_their_number() -> None:
+    assert [errors.plural(k, "run") for k in (0, 1, 2)] == ["0 runs", "1 run", "2 runs"]
+    assert errors.plural(1, "process", "processes") == "1 process"
+    assert errors.plural(3, "process", "processes") == "3 processes"

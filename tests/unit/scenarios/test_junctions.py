@@ -69,6 +69,10 @@ def test_files_of_experiments_name_junctions_beside_them(tmp_path: Path) -> None
             "unknown key of a junction 'bearing'; .* did you mean 'bearings'",
         ),
         ("side = 'left'", "bearings are missing"),
+        (
+            "traffic = 'in'",
+            r"mine.toml: unknown key 'traffic'; it belongs to a road, \[\[roads\]\]",
+        ),
         ("bearings = [0, 10, 180]", "mine.toml: arms a and b are 10° apart"),
         ("bearings = [0, 90, 180]\nroads = [{ trafic = 'in' }, {}, {}]", "trafic"),
         ("bearings = [0, 90, 180]\nforbidden = ['d1']", "no movement 'd1'"),

@@ -19,6 +19,7 @@ from scenarios.library import (
     four_way,
     from_bearings,
     regular,
+    replayed,
     scenario_named,
     three_way,
 )
@@ -213,3 +214,22 @@ def test_the_package_offers_its_names() -> None:
     assert all(hasattr(scenarios, name) for name in scenarios.__all__)
     assert scenarios.four_way is four_way
     assert not hasattr(scenarios, "four_ways")
+
+
+@pytest.mark.parametrize(
+    ("text", "fleet", "message"),
+    [
+        ("25300,a,1,car", None, r"horizon of 10 s from 25260 s \(07:01\) on: the first recorded "
+         r"arrival is at 25300 s \(07:01:40\)"),
+        ("25261,a,1,bus", None, r"type 'bus', but the profile paper drives car alone; a fleet .*"
+         "such as car:0.9,bus:0.1"),
+        ("25261,a,1,buss", None, r"unknown vehicle type of the arrivals: 'buss'.*mean 'bus'\?"),
+        ("25261,a,1,cars", {"car": 0.5, "lcv": 0.5}, r"'cars'; allowed: car, lcv; did .*'car'\?"),
+    ],
+)  # fmt: skip
+def test_what_a_file_of_arrivals_does_not_fit_is_said_by_its_clock(
+    tmp_path: Path, text: str, fleet: Any, message: str
+) -> None:
+    (tmp_path / "a.csv").write_text(f"demand_time_s,lane,manoeuvre,type\n{text}\n")
+    with pytest.raises(InputError, match=rf"a\.csv: .*{message}"):
+        replayed(four_way(fleet=fleet, horizon=10.0), tmp_path / "a.csv", "07:01")

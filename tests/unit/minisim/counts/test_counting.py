@@ -2,57 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
-from minisim.counts import Count, read_counts
+from minisim.counts import read_counts
 from minisim.errors import FileError, InputError, MinisimError
 from minisim.fleet import fleet_named
 from minisim.vehicle import VehicleType
 from scenarios import four_way
-
-#: German: a row per stream and interval, a column per class; streams by approach and letter.
-GERMAN = "\n".join([
-    "zufahrt,spur,kennung,intervall_start,intervall_ende,rad,krad,pkw,lkw,bus",
-    *(f"{arm},1,{arm}{turn}..(1),{start},{end},2,1,{n},0,{bus}"
-      for start, end, n in (("06:00", "06:15", 20), ("06:15", "06:30", 40))
-      for arm in "ABCD" for turn, bus in (("L", 0), ("G", 3), ("R", 0))),
-    "B,2,BW..(14),06:00,06:15,0,0,7,0,0",
-    "B,2,BW..(14),06:15,06:30,0,0,0,0,0",
-])  # fmt: skip
-
-#: American: a row per interval with a column per movement, no classes.
-MOVES = [f"{way}{turn}" for way in ("NB", "SB", "EB", "WB") for turn in "LTRU"]
-AMERICAN = "\n".join([
-    "\t".join(["Time", *MOVES]),
-    "\t".join(["7:45 AM", *(["10", "80", "5", "1"] * 4)]),
-    "\t".join(["8:00 AM", *(["20", "90", "15", "0"] * 4)]),
-])  # fmt: skip
-
-#: British: a row per interval, pair of arms and class; semicolons and decimal commas.
-BRITISH = "\n".join([
-    "Time;From;To;Class;Vehicles",
-    *(f"{time};{a};{b};{kind};{n}"
-      for time in ("07:00 - 07:15", "07:15 - 07:30")
-      for a in "123" for b in "123" if a != b
-      for kind, n in (("Car", "12,5"), ("OGV1", "2"), ("PSV", "1"), ("Pedal Cycle", "4"))),
-])  # fmt: skip
-
-
-def read(
-    folder: Path, text: str, mapping: Mapping[str, Any] | None = None, encoding: str = "utf-8"
-) -> Count:
-    path = folder / "sheet.csv"
-    path.write_bytes(text.encode(encoding))
-    return read_counts(path, mapping)
+from tests.builders import AMERICAN, BRITISH, GERMAN, read_count
 
 
 def test_a_row_per_stream_and_a_column_per_class(tmp_path: Path) -> None:
-    count = read(tmp_path, GERMAN)
+    count = read_count(tmp_path, GERMAN)
     assert count.arms == ("A", "B", "C", "D")
     assert count.edges == (21_600, 22_500, 23_400)
     assert count.types == ("motorcycle", "car", "bus")
@@ -73,7 +37,7 @@ def test_a_row_per_stream_and_a_column_per_class(tmp_path: Path) -> None:
 def test_a_column_per_movement(tmp_path: Path) -> None:
     """NB is traffic to the north, from the south: lane c of N, E, S, W."""
     text = AMERICAN.replace("\t10\t80\t5\t1", "\t11\t80\t5\t1", 1)
-    count = read(tmp_path, text, encoding="utf-8-sig")
+    count = read_count(tmp_path, text, encoding="utf-8-sig")
     assert count.arms == ("N", "E", "S", "W")
     assert count.edges == (27_900, 28_800, 29_700)
     assert count.types == ("car",)
@@ -84,7 +48,7 @@ def test_a_column_per_movement(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "cp1252"])
 def test_a_row_per_pair_of_arms_and_class(tmp_path: Path, encoding: str) -> None:
-    count = read(tmp_path, BRITISH, {"classes": {"Pedal Cycle": "left out"}}, encoding)
+    count = read_count(tmp_path, BRITISH, {"classes": {"Pedal Cycle": "left out"}}, encoding)
     assert count.arms == ("1", "2", "3")
     assert count.types == ("car", "bus", "truck")
     assert count.vehicles.shape == (2, 3, 2, 3)
@@ -94,23 +58,23 @@ def test_a_row_per_pair_of_arms_and_class(tmp_path: Path, encoding: str) -> None
 
 def test_a_sheet_is_of_one_day(tmp_path: Path) -> None:
     dated = GERMAN.replace(",06:", ",2012-05-08 06:")
-    count = read(tmp_path, dated)
+    count = read_count(tmp_path, dated)
     assert count.edges == (21_600, 22_500, 23_400)
     with pytest.raises(FileError, match="a second day, 2012-05-09; keep the rows of one day"):
-        read(tmp_path, dated.replace("05-08 06:15,", "05-09 06:15,"))
+        read_count(tmp_path, dated.replace("05-08 06:15,", "05-09 06:15,"))
 
 
 def test_a_number_that_may_be_thousands_is_refused(tmp_path: Path) -> None:
     """In a sheet of decimal commas."""
     with pytest.raises(FileError, match=r"'1\.200' may mean 1200 or 1\.2; write 1200 or 1,2"):
-        read(tmp_path, BRITISH.replace("12,5", "1.200"))
+        read_count(tmp_path, BRITISH.replace("12,5", "1.200"))
 
 
 def test_a_mapping_says_what_a_sheet_does_not(tmp_path: Path) -> None:
     text = GERMAN.replace("zufahrt", "leg no").replace("pkw", "P").replace(",A,", ",A,")
     mapping = {"approach": "leg no", "classes": {"P": "car"}, "arms": ["D", "A", "B", "C"],
                "turns": {"AG..(1)": "left", "AL..(1)": 2}, "from": "06:15"}  # fmt: skip
-    count = read(tmp_path, text, mapping)
+    count = read_count(tmp_path, text, mapping)
     assert count.arms == ("D", "A", "B", "C")
     assert count.demand.periods[0].turns[1] == (44, 41, 41)
     assert count.left_out["outside from … until"] > 0
@@ -126,14 +90,14 @@ def test_three_arms_are_left_and_right_of_each_other(tmp_path: Path) -> None:
             ("W", "left", 5), ("W", "thru", 6),
         )
     )  # fmt: skip
-    count = read(tmp_path, text)
+    count = read_count(tmp_path, text)
     assert count.arms == ("N", "E", "W")
     assert count.demand.periods[0].turns == ((1, 2), (3, 4), (5, 6))
 
 
 def test_a_missing_row_is_named(tmp_path: Path) -> None:
     lines = [line for line in GERMAN.splitlines() if not line.startswith("C,1,CG..(1),06:15")]
-    count = read(tmp_path, "\n".join(lines))
+    count = read_count(tmp_path, "\n".join(lines))
     assert "C, manoeuvre 2: no row for the intervals from 06:15; taken as 0" in count.notes
 
 
@@ -161,7 +125,7 @@ def test_a_sheet_that_is_wrong_is_refused_in_one_sentence(
     tmp_path: Path, old: str, new: str, message: str
 ) -> None:
     with pytest.raises(FileError, match=message) as caught:
-        read(tmp_path, GERMAN.replace(old, new))
+        read_count(tmp_path, GERMAN.replace(old, new))
     assert "\n" not in str(caught.value)
 
 
@@ -187,7 +151,10 @@ def test_what_is_no_sheet_is_refused(tmp_path: Path, data: bytes, message: str) 
         ({"aproach": "zufahrt"}, "unknown key of a mapping 'aproach'.*did you mean 'approach'"),
         ({"approach": "Zufart"}, "unknown column of .* for approach: 'Zufart'.*'zufahrt'"),
         ({"classes": {"pkw": "cra"}}, "unknown type of the class 'pkw', 'cra'.*'car'"),
-        ({"arms": ["A", "B", "C"]}, "unknown arm of .* 'D'"),
+        (
+            {"arms": ["A", "B", "C"]},
+            "line 11: the arm 'D' is missing among the arms of the mapping, A, B, C",
+        ),
         ({"arms": 4}, "arms must be a sequence"),
         *(
             (
@@ -197,8 +164,9 @@ def test_what_is_no_sheet_is_refused(tmp_path: Path, data: bytes, message: str) 
             for k in (4, 0, -1)
         ),
         ({"arms": ["A", "B", "B", "C", "D"]}, "arms names 'B' twice"),
-        ({"interval": 0.01}, r"interval \[min\] must be at least 1"),
-        ({"from": "09:00"}, "nothing is left to simulate"),
+        ({"from": "09:00"}, r"nothing is left to simulate; left out: 823 outside from … until$"),
+        ({"from": "07:00", "until": "06:00"}, "from must be before until, got 07:00 and 06:00"),
+        ({"start": "intervall_ende", "end": "intervall_ende"}, "'intervall_ende' .* for two keys"),
         ({"from": "9h"}, "from must be a time of day"),
     ],
 )
@@ -206,7 +174,7 @@ def test_a_wrong_mapping_is_refused(
     tmp_path: Path, mapping: dict[str, object], message: str
 ) -> None:
     with pytest.raises(MinisimError, match=message):
-        read(tmp_path, GERMAN, mapping)
+        read_count(tmp_path, GERMAN, mapping)
 
 
 def test_five_arms_need_exits(tmp_path: Path) -> None:
@@ -214,7 +182,7 @@ def test_five_arms_need_exits(tmp_path: Path) -> None:
         f"7:00,{k},left,1\n8:00,{k},left,1\n" for k in "12345"
     )
     with pytest.raises(FileError, match="with 5 arms, left on '1' does not say which exit"):
-        read(tmp_path, text)
+        read_count(tmp_path, text)
 
 
 @pytest.mark.parametrize("n", [5, 6])
@@ -229,7 +197,7 @@ def test_with_exits_a_sheet_may_have_five_arms_or_more(tmp_path: Path, n: int, w
         for row in ([",".join(map(str, counts.values()))] if wide
                     else [f"{a},{b},{count}" for (a, b), count in counts.items()])
     ]  # fmt: skip
-    count = read(tmp_path, "\n".join([f"time,{header}", *lines]))
+    count = read_count(tmp_path, "\n".join([f"time,{header}", *lines]))
     assert count.arms == points
     assert count.demand.periods[1].turns == (tuple(range(1, n)),) * n
     assert len(count.demand.draw(n, 900.0, 1)) > 0
@@ -242,7 +210,7 @@ def test_a_mapping_says_which_exits_turns_of_five_arms_take(tmp_path: Path) -> N
         for number, turn in enumerate(("hard left", "left", "right", "hard right"), start=1)
     )  # fmt: skip
     turns = {"hard left": 1, "left": "2", "right": 3, "hard right": 4}
-    count = read(tmp_path, text, {"turns": turns})
+    count = read_count(tmp_path, text, {"turns": turns})
     assert count.demand.periods[0].turns == ((1, 2, 3, 4),) * 5
 
 
@@ -250,19 +218,21 @@ def test_columns_that_others_replace_are_named(tmp_path: Path) -> None:
     text = "time,from,to,count,car\n" + "".join(
         f"{time},{a},{b},9,1\n" for time in ("7:00", "7:15") for a in "123" for b in "123" if a != b
     )
-    count = read(tmp_path, text)
+    count = read_count(tmp_path, text)
     assert "columns not used: count" in count.notes
     assert count.vehicles.sum() == 12
 
 
 def test_a_count_is_of_one_junction(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="'sheet' has 3 lanes, the junction has 4"):
-        four_way(demand=read(tmp_path, BRITISH, {"classes": {"Pedal Cycle": "left out"}}).demand)
+        four_way(
+            demand=read_count(tmp_path, BRITISH, {"classes": {"Pedal Cycle": "left out"}}).demand
+        )
 
 
 def test_what_is_drawn_is_what_was_counted(tmp_path: Path) -> None:
     """Vehicles by movement over 40 runs, against the sheet's sums: Pearson's χ² of 12 cells."""
-    count = read(tmp_path, GERMAN)
+    count = read_count(tmp_path, GERMAN)
     sheet, drawn = 40 * count.vehicles.sum((0, 3)), np.zeros((4, 3))
     for seed in range(40):
         it = count.demand.draw(4, count.demand.duration, seed)
@@ -274,6 +244,23 @@ def test_empty_cells_and_counts_given_twice_are_named(tmp_path: Path) -> None:
     text = "time,from,to,count\n" + "".join(
         f"{time},{a},{b},9\n" for time in ("7:00", "7:15") for a in "123" for b in "123" if a != b
     )
-    count = read(tmp_path, text.replace("7:15,1,2,9", "7:15,1,2,") + "7:00,1,2,9\n")
+    count = read_count(tmp_path, text.replace("7:15,1,2,9", "7:15,1,2,") + "7:00,1,2,9\n")
     assert "empty cells, taken as 0: 1, the first in line 8" in count.notes
-    assert "counts given twice, and added: 1, the first again in line 14" in count.notes
+    assert "counts given twice, and added: 1, the first in line 14" in count.notes
+
+
+def test_a_class_without_a_row_is_named(tmp_path: Path) -> None:
+    """Others have one in that interval, so the stream itself is not missing."""
+    text = BRITISH.replace("Pedal Cycle", "Van").replace("07:15 - 07:30;1;3;PSV;1\n", "")
+    count = read_count(tmp_path, text)
+    assert [note for note in count.notes if "no row" in note] == [
+        "class 'PSV': no row in 1 of 12 intervals and streams that others have, the first from "
+        "07:15 on 1, manoeuvre 2; taken as 0"
+    ]
+
+
+def test_a_sheet_of_sums_alone_says_what_a_mapping_can_do(tmp_path: Path) -> None:
+    text = GERMAN.replace("rad,krad,pkw,lkw,bus", "rad,fuss,Kfz,summe,gesamt")
+    with pytest.raises(FileError, match=r"left out: .* Kfz \(a sum or .*a mapping can"):
+        read_count(tmp_path, text)
+    assert read_count(tmp_path, text, {"classes": {"Kfz": "car"}}).types == ("car",)

@@ -24,11 +24,11 @@ from minisim.laws import (
 )
 
 
-def accelerate(vehicles: Records, lanes: Records, road: Layout, law: Law) -> bool:
+def accelerate(vehicles: Records, lanes: Records, layout: Layout, law: Law) -> bool:
     """Choose every vehicle's acceleration from the present state; returns whether two overlap."""
     overlap = False
-    branch, ends, types = road.branch, road.ends, road.types
-    start, speed = road.section_start, road.section_speed
+    branch, ends, types = layout.branch, layout.ends, layout.types
+    start, speed = layout.section_start, layout.section_speed
     for lane in range(len(lanes)):
         is_open = lanes[lane]["open"] != 0
         first, front = lanes[lane]["first"], lanes[lane]["front"]
@@ -102,9 +102,9 @@ def accelerate(vehicles: Records, lanes: Records, road: Layout, law: Law) -> boo
     return overlap
 
 
-def move(vehicles: Records, lanes: Records, road: Layout, law: Law) -> None:
+def move(vehicles: Records, lanes: Records, layout: Layout, law: Law) -> None:
     """Move every vehicle by one step, and add up waiting and loss."""
-    start, speed = road.section_start, road.section_speed
+    start, speed = layout.section_start, layout.section_speed
     for lane in range(len(lanes)):
         for i in range(lanes[lane]["first"], lanes[lane]["next"]):
             if vehicles[i]["status"] != DRIVING:

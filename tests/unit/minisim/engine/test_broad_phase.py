@@ -27,7 +27,11 @@ FLEET = Fleet(
 def test_it_misses_no_touch_and_asks_for_no_others(arms: tuple[float, ...], side: str) -> None:
     junction, n = Intersection(arms, side=side, lane_width=4.5, junction_radius=16.0), len(arms)
     site, random = Site(junction, FLEET, 14.0, (1.0,) * n), np.random.default_rng(n)
-    road, law, entry = build_layout(site, Plan()), build_law(site, Plan()), junction.approach_length
+    layout, law, entry = (
+        build_layout(site, Plan()),
+        build_law(site, Plan()),
+        junction.approach_length,
+    )
     touches = 0
     for _ in range(40):
         manoeuvres, kinds = random.integers(1, n, n), random.choice(FLEET.names, n)
@@ -38,8 +42,8 @@ def test_it_misses_no_touch_and_asks_for_no_others(arms: tuple[float, ...], side
             vehicles["s"] = entry + random.uniform(0.0, 40.0, n)
             near = near_bodies(vehicles, site)[1]
             larger = [it._replace(length=it.length + 0.1, width=it.width + 0.1) for it in near]
-            pack = pack_of(vehicles, lanes, road, law)
-            said = may_touch(*pack, lanes, road, law, np.zeros((16 * n, 6)))
+            pack = pack_of(vehicles, lanes, layout, law)
+            said = may_touch(*pack, lanes, layout, law, np.zeros((16 * n, 6)))
             assert said or not touching(near)
             assert not said or touching(larger)
             touches += said

@@ -214,7 +214,7 @@ def chosen(
     what = replayed(what, *demanded, horizon=200.0)
     site = what.site(0)
     plan = Unregulated().start(site).plan
-    road = build_layout(site, plan)
+    layout = build_layout(site, plan)
     law = build_law(
         site, plan, depart_speed=what.depart_speed, record=None, record_window=(0.0, math.inf)
     )
@@ -237,15 +237,15 @@ def chosen(
         if s >= law.entry:
             lanes["front"][lane] = row + 1
             vehicles["advice"][row] = 10.0
-        exit_arm = int(road.ends[vehicles["path"][row], 2])
-        if s >= road.ends[vehicles["path"][row], 0]:
+        exit_arm = int(layout.ends[vehicles["path"][row], 2])
+        if s >= layout.ends[vehicles["path"][row], 0]:
             cruise.last[exit_arm] = row
             cruise.memory["left"][row] = 1
         rows.append(row)
     before = vehicles["a"].copy()
     for _ in range(steps):
         vehicles["a"] = before
-        accelerate(vehicles, lanes, road, law, cruise)
+        accelerate(vehicles, lanes, layout, law, cruise)
     return [float(vehicles["a"][row]) for row in rows]
 
 
@@ -450,7 +450,7 @@ def obeying(
     car = (0.0, lane, manoeuvre)
     what = replayed(MAKERS[4](profile="as_run_obeying"), car, horizon=200.0)
     site = what.site(0)
-    road = build_layout(site, FixedTime().start(site).plan)
+    layout = build_layout(site, FixedTime().start(site).plan)
     law = build_law(
         site, FixedTime().start(site).plan, depart_speed=0.0, record=None,
         record_window=(0.0, math.inf),
@@ -462,8 +462,8 @@ def obeying(
     vehicles["status"], lanes["next"][lane] = DRIVING, 1
     vehicles["s"], vehicles["v"], vehicles["a"] = s, v, a
     lanes["front"][lane] = int(s >= law.entry)
-    accelerate(vehicles, lanes, road, law, cruise)
-    return vehicles, lambda: look(vehicles, lanes, road, law, cruise, 1)
+    accelerate(vehicles, lanes, layout, law, cruise)
+    return vehicles, lambda: look(vehicles, lanes, layout, law, cruise, 1)
 
 
 def test_a_limit_counts_for_the_first_step_beyond_it_and_through_the_lag() -> None:

@@ -326,7 +326,10 @@ def test_a_run_in_a_notebook_is_valid_html_with_escaped_names() -> None:
 def test_a_repr_is_short_and_has_the_means(run: Run) -> None:
     lines = repr(run).splitlines()
     assert len(lines) <= 5
-    assert "four-way, dim+humans=0.4: 250 veh/h/lane, profile fair, seed 3, 300 s" in lines[0]
+    assert (
+        "four-way, dim+humans=0.4: 250 veh/h/lane, profile fair, fleet car, seed 3, 300 s"
+        in lines[0]
+    )
     assert f"waiting {run.summary()['waiting_time_s']:.2f} s" in repr(run)
     warm = replace(run, scenario=replace(four_way(horizon=300.0), warmup=60.0))
     for text in (repr(warm).splitlines()[0], warm._repr_html_()):

@@ -128,5 +128,5 @@ def test_a_node_is_found_or_near_ones_are_named(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="side is for an extract"):
         read_junction(path, "C", side="left")
     path.write_text(town_text({"n": (0.0, 99.0), "s": (0.0, -99.0)}))
-    with pytest.raises(InputError, match="has 0 of 3 nodes that can be read"):
+    with pytest.raises(InputError, match="none of its 3 nodes can be read"):
         read_junction(path)

@@ -371,6 +371,8 @@ def test_a_run_begins_at_a_time_of_day(capsys: Captured, tmp_path: Path) -> None
     morning.write_text("demand_time_s,lane,manoeuvre\n25205,a,2\n25207,b,1\n28900,c,3\n")
     run = ("run", "four-way", "--arrivals", str(morning), "--no-safety")
     assert "the first recorded arrival is at 25205 s (07:00:05)" in fails(capsys, *run)
+    late = fails(capsys, *run, "--start", "07:00", "--horizon", "3")
+    assert "first recorded arrival is at 25205 s (07:00:05)" in late
     for start, trips in (("07:00", 2), ("25205", 2), ("8:00", 1), ("7:00:06", 1)):
         assert answer(capsys, *run, "--start", start)["trips"] == trips
     assert "start must be a time of day" in fails(capsys, *run, "--start", "7h")
@@ -811,3 +813,14 @@ def test_counts_says_what_it_understood_and_saves_a_demand(
     assert "the junction has 4" in fails(capsys, "run", "four-way", "--demand", str(day))
     sheet.write_text(sheet.read_text().replace("7:15,N,L", "7:15,N,X"))
     assert "unknown turn 'X'" in fails(capsys, "counts", str(sheet))
+
+
+def test_the_head_of_a_run_has_its_fleet_and_the_unit_of_its_inflow(capsys: Captured) -> None:
+    run = "run four-way --fleet motorcycle:0.5,car:0.5 --no-safety --horizon 20 -d 175"
+    assert ": 175 veh/h/lane, profile paper, fleet motorcycle:0.5,car:0.5, seed 0" in ok(
+        capsys, *run.split()
+    )
+    # A motorcycle counts 0.75: 175 units are 200 vehicles.
+    assert ": 200 veh/h/lane (175 pcu/h/lane), profile paper, fleet" in ok(
+        capsys, *run.split(), "--unit", "pcu"
+    )

@@ -37,7 +37,7 @@ def test_without_a_store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys
     monkeypatch.setattr(gallery, "GALLERY", few)
     assert main(["figures", "--out", str(tmp_path)]) == 0
     captured = capsys.readouterr()
-    assert captured.out.startswith("wrote 1 figures")
+    assert captured.out.startswith("wrote 1 figure or table")
     assert captured.err == "  not 2 others, which need runs: name a store with --store\n"
 
 

@@ -41,8 +41,9 @@ def test_all_nodes_are_listed_with_their_verdicts(
 ) -> None:
     assert main(["junction", town, "--list"]) == 0
     told = capsys.readouterr().out
-    assert "1 arm for cars; 3 are needed" in told
-    assert "1 of 4 nodes can be read; 1 have 3 or more arms with one lane per direction" in told
+    assert "no   n, priority, 1 arm: 1 arm for cars; 3 are needed" in told
+    assert max(map(len, told.splitlines())) <= 80
+    assert "1 of 4 nodes can be read; 1 has 3 or more arms with one lane per direction" in told
     assert main(["junction", town, "--list", "--json"]) == 0
     rows = {row["node"]: row for row in json.loads(capsys.readouterr().out)}
     assert [name for name, row in rows.items() if row["readable"]] == ["C"]
@@ -79,7 +80,12 @@ def test_commands_about_rules_take_a_node_and_know_what_is_closed_there(
     assert main(["harmony", *at, "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["closed"] == ["a1"]
     assert main(["harmony", *at]) == 0
-    assert "no vehicle may take a1" in capsys.readouterr().out
+    told = capsys.readouterr().out
+    assert "● harmony, · conflict, – closed: no vehicle may take a1" in told
+    rows = {line.split()[0]: line.split()[1:] for line in told.splitlines() if line.strip()}
+    assert rows["a1"] == ["–"] * 6
+    assert rows["b1"][0] == "–"
+    assert "–" not in rows["b1"][1:]
     assert main(["verify", *at, "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert told["cases"] == sum(told["cases_by_vehicles_that_go"].values()) == 17

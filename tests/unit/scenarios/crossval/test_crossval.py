@@ -240,7 +240,7 @@ def test_replays_are_judged_by_the_papers_means() -> None:
     assert judged.meets_paper("minisim") is True
     assert judged.meets_paper("sumo") is False
     assert summary([judged]) == (
-        "0 of 1 cells: both hosts agree within the tolerances; minisim meets the paper in 1 of 1; "
+        "0 of 1 cell: both hosts agree within the tolerances; minisim meets the paper in 1 of 1; "
         "SUMO meets the paper in 0 of 1; 1 verdict over fewer than 30 trips"
     )
     text = markdown([judged], "x", {})

@@ -150,6 +150,11 @@ WRONG = [
     ("[[experiment]]\nsed = 1\n[[experiment]]", r"\[\[experiment\]\] 1: .*did you mean 'seeds'"),
     ("[experiment]\nseeds = 1", r"two brackets"),
     ("experiment = [1]", r"two brackets"),
+    ("lane_width = 3.5", r"'lane_width'; it belongs to the scenario: scenario = { name = "
+     r"\"four-way\", lane_width = … }"),
+    ("[[experiment]]\nbearings = [0, 90, 180]", r"'bearings'; it belongs to the scenario"),
+    ('gate = "harmonious"', r"'gate'; it belongs to a controller: controller = { name = \"dim\", "),
+    ('scenario = {name = "four-way", density = 150}', r"scenario 'density'; it belongs on a line"),
     ('scenario = "for-way"', r"did you mean 'four-way'"),
     ('scenario = {name = "custom", bearing = [0]}', r"key of a scenario 'bearing'.*'bearings'"),
     ('scenario = {bearings = [0]}', r"has no name"),
