@@ -61,8 +61,8 @@ def summarise(
     Args:
         run: what to measure, without the warm-up of its scenario (`Run.counted`).
         metrics: names of `minisim.results.metrics.METRICS`, `Metric`s or functions
-            (`minisim.results.metrics.metric_of`). Each mean asked for also gets its median, 95th
-            percentile and maximum (`SPREAD`, numpy's linear method).
+            (`minisim.results.metrics.metric_of`). Each mean asked for, of trips or over time, also
+            gets its median, 95th percentile and maximum (`SPREAD`, numpy's linear method).
         by: further groupings, such as "movement".
 
     Raises `InputError` for an unknown metric or group, a metric that needs trajectories that were

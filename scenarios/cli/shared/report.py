@@ -95,7 +95,7 @@ def _columns(metrics: Iterable[Metric], usual: Iterable[str]) -> dict[str, str]:
     for metric in metrics:
         if metric.grouped and metric.name != "unfinished":
             columns[metric.name] = metric.heading
-        if metric.per == "trip":
+        if metric.per != "run":
             columns |= {f"{metric.name}_{what}": what for what in SPREAD}
     return columns or {name: heading(name) for name in usual}
 
