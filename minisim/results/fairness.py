@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 def order_reversals(run: Run) -> Floats:
     """How many vehicles on conflicting ways came later than each one but went first, shape (k,).
 
-    These are the slips of Gordon (1987, Slips and skips in queues, MIT). A vehicle comes when it
-    would be at the junction at the limit, from its demand on; it goes when its front enters the
-    junction. Raises `InputError` unless recorded.
+    These are slips (Larson 1987, Perspectives on queues, Operations Research 35:895). A vehicle
+    comes when it would be at the junction at the limit, from its demand on; it goes when its front
+    enters the junction. Raises `InputError` unless all of the time was recorded.
     """
     trips, site = run.columns, run.site
     paths = site.intersection.paths

@@ -171,7 +171,7 @@ TABLE: Final = (
         "order_reversals", fairness.order_reversals, "", "trip", "trajectories",
         title="order reversals",
         meaning="vehicles on conflicting ways that came later than this one and went first",
-        equation="slips (Gordon 1987); comes: demand + way to the junction/limit, goes: enters it",
+        equation="slips (Larson 1987); comes: demand + way to the junction/limit, goes: enters it",
     ),
     Metric(
         "fuel_g", driving.fuel, "g", "trip", "whole trajectories", title="fuel",
@@ -256,7 +256,7 @@ TABLE: Final = (
             ("short_pet", "PET < 1 s", "share of vehicles that entered an area so soon after "
              "another", f"as the second {_HORST}"),
             ("high_drac", "DRAC > 3.4 m/s²", "share of vehicles that had to brake so hard",
-             "as the follower (Archer 2005; AASHTO 2018, section 3.2.2)"),
+             "as the follower (AASHTO 2018, section 3.2.2; Archer 2005 has 3.35)"),
         )
     ),
     *(

@@ -45,8 +45,8 @@ if TYPE_CHECKING:
     from minisim.results.run import Run
 
 #: An encounter is critical below these [s] (van der Horst 1990, A time-based analysis of road user
-#: behaviour in normal and critical encounters), or above this [m/s²] (Archer 2005, Indicators for
-#: traffic safety assessment and prediction; AASHTO 2018, section 3.2.2).
+#: behaviour in normal and critical encounters), or above this [m/s²] (what is comfortable, as in
+#: `minisim.results.driving`; Archer 2005, Indicators for traffic safety assessment, has 3.35).
 SHORT_TTC, SHORT_PET, HIGH_DRAC = 1.5, 1.0, 3.4
 
 #: Longer than any path [m]: keeps vehicles apart in one ascending array.

@@ -66,17 +66,25 @@ def tracks_of(run: Run) -> Tracks:
 
 def whole_tracks(run: Run) -> Tracks:
     """The same, on all of the road; raises `InputError` if a part was not recorded."""
-    since, until = run.record_window
-    if run.record != "all" or since > float(run.scenario.warmup) or until < run.columns.end:
+    if run.record != "all" or not _all_the_time(run):
         raise InputError("not all of each trip was recorded: simulate with record='all'")
     return run.tracks
+
+
+def _all_the_time(run: Run) -> bool:
+    """Whether the recording lasted from the end of the warm-up to the end."""
+    since, until = run.record_window
+    return since <= float(run.scenario.warmup) and until >= run.columns.end
 
 
 def entry_times(run: Run) -> Floats:
     """When the front of each vehicle enters the junction [s], shape (k,); infinite if it has not.
 
-    The last step is shared out at its final speed.
+    The last step is shared out at its final speed. Raises `InputError` unless all of the time was
+    recorded, near the junction at least.
     """
+    if run.record is not None and not _all_the_time(run):
+        raise InputError("not all of the time was recorded: simulate without record_window")
     tracks, times = run.tracks, np.full(len(run.columns.lane), np.inf)
     past = tracks.s - np.array([path.entry for path in run.site.intersection.paths])[tracks.path]
     inside = np.flatnonzero(past >= 0.0)[::-1]  # so that the first row of a vehicle counts

@@ -96,6 +96,15 @@ def test_the_fifo_of_a_reservation_reverses_less_than_a_signal() -> None:
     assert few["order_reversals"] < 0.5 * many["order_reversals"]
 
 
+def test_all_of_the_time_is_needed() -> None:
+    scenario = four_way(200, profile="fair", horizon=40.0)
+    with pytest.raises(InputError, match="no trajectories: simulate with record='junction'"):
+        order_reversals(minisim.simulate(scenario, Dim()))
+    part = minisim.simulate(scenario, Dim(), record="all", record_window=(5.0, 20.0))
+    with pytest.raises(InputError, match="not all of the time was recorded"):
+        order_reversals(part)
+
+
 def test_lanes_of_a_run(run: Run) -> None:
     columns = run.columns._replace(waiting_time=np.array([1.0, 2.0, 6.0]))
     assert worst_lane(columns) == 6.0
