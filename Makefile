@@ -6,7 +6,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 PIP    := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 # One worker a core; beyond 8, starting them costs more than they save.
-TEST   := $(BIN)/python -m pytest -n auto --maxprocesses 8
+TEST   := $(BIN)/python -m pytest -n auto --maxprocesses 8 --dist worksteal
 
 .DEFAULT_GOAL := help
 .PHONY: help demo test test-all lint bench mutants pictures figures reproduce clean
