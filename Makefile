@@ -29,9 +29,8 @@ lint: $(VENV)/.installed-dev  ## style, format, types, layer contracts
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-bench: $(VENV)/.installed-all  ## speed, as ratios to SUMO in the same run
-	$(BIN)/python tests/bench/bench.py
-	$(BIN)/python tests/bench/workers.py
+bench: $(VENV)/.installed-all  ## speed, beside SUMO and C in the same run; BENCH="--append FILE" keeps a line
+	$(BIN)/python -m tests.bench.bench $(BENCH)
 
 mutants: $(VENV)/.installed-mutants  ## do the tests notice when dim is changed? A long run; a second call continues it
 	$(BIN)/python tests/mutants.py run

@@ -13,8 +13,6 @@ from functools import cache, lru_cache, reduce
 from itertools import combinations, pairwise, product
 from operator import and_
 
-import networkx as nx
-
 from dim.harmony import HarmonyMatrix
 from minisim.errors import InputError, choice, instance, integer, items, show
 from minisim.junction.movements import ARM_NAMES, Movement
@@ -213,6 +211,8 @@ def _edges(participants: Movements, matrix: HarmonyMatrix) -> tuple[tuple[Moveme
 
 def maximal_cliques(participants: Movements, matrix: HarmonyMatrix) -> list[Movements]:
     """All maximal cliques, in no reliable order; each sorted by lane."""
+    import networkx as nx
+
     graph: nx.Graph[Movement] = nx.Graph()
     graph.add_nodes_from(participants)
     graph.add_edges_from(_edges(participants, matrix))

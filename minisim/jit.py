@@ -13,8 +13,10 @@ import hashlib
 import inspect
 import os
 import sys
+import warnings
 from collections.abc import Callable, Hashable, Sequence
 from functools import lru_cache
+from importlib import import_module
 from multiprocessing import parent_process
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -75,7 +77,7 @@ def direct(
     Arguments of one `kind` always have the same types. numba looks at every field of every argument
     at each call, which for the kernel takes three times as long as the call itself.
     """
-    if not COMPILED:
+    if not (COMPILED and _known()):
         return function
     if (function, kind) not in _ENTRIES:
         import numba
@@ -90,7 +92,7 @@ _ENTRIES: dict[tuple[object, Hashable], Callable[..., Any]] = {}
 
 def _inner(function: _F, **options: object) -> _F:
     compiled: Any = _compile(function, no_cpython_wrapper=True, no_cfunc_wrapper=True, **options)
-    if compiled is not function:
+    if COMPILED and _known():
         # numba would follow a null pointer if Python called it.
         compiled.__class__ = _inner_class()
     return cast(_F, compiled)
@@ -114,30 +116,86 @@ def _compile(function: _F, **options: object) -> _F:
         return function
     import numba
 
+    if not _known():
+        return cast(_F, numba.njit(error_model="numpy")(function))
     chosen: dict[str, Any] = {"error_model": "numpy", "_nrt": False, **options}
     compiled: Any = numba.njit(**chosen)(function)
     compiled._cache = _cache_class()(function)  # what `cache=True` does, with our class
     return cast(_F, compiled)
 
 
+#: What we use of numba that it does not document. Tried: numba 0.60.0 with NumPy 2.0.2, the oldest
+#: that we allow, and 0.68.1 with 2.4.6.
+_INNER_PARTS = {
+    "caching.FunctionCache": ("_guard_against_spurious_io_errors", "_load_overload"),
+    "caching.IndexDataCacheFile": ("_data_name", "_load_index", "_save_data", "_save_index"),
+    "cpu.CPUTargetOptions": ("_nrt", "forceinline", "no_cfunc_wrapper", "no_cpython_wrapper"),
+    "registry.CPUDispatcher": ("compile",),
+    "runtime.nrt.rtsys": ("initialize",),
+}
+
+
+@lru_cache
+def _known() -> bool:
+    """Whether this numba has all of them; without them it gives the same runs, more slowly."""
+    import numba
+
+    try:
+        for name, parts in _INNER_PARTS.items():
+            module, _, owner = name.rpartition(".")
+            for part in parts:
+                getattr(getattr(import_module(f"numba.core.{module}"), owner), part)
+    except (ImportError, AttributeError):
+        told = f"minisim does not know numba {numba.__version__}: each process compiles anew"
+        warnings.warn(told, stacklevel=2)
+        return False
+    return True
+
+
 @lru_cache
 def _cache_class() -> Any:
     import numba
-    from numba.core.caching import FunctionCache
+    from numba.core.caching import FunctionCache, IndexDataCacheFile
+    from numba.core.runtime.nrt import rtsys
+
+    class Files(IndexDataCacheFile):
+        """An index, and the code for each signature, which several processes may write at once.
+
+        numba numbers the codes, and writes the index first: who reads meanwhile gets the code of
+        older sources, or of another signature.
+        """
+
+        def save(self, key: Any, data: Any) -> None:
+            """Write the code, under a name that no other code has, then the index."""
+            kept = self._load_index()  # type: ignore[no-untyped-call]  # numba has no types
+            if not kept:
+                self._remove_old()
+            digest = hashlib.sha256(repr((self._source_stamp, key)).encode()).digest()
+            name = self._data_name(int.from_bytes(digest[:8]))  # type: ignore[no-untyped-call]
+            self._save_data(name, data)  # type: ignore[no-untyped-call]
+            self._save_index({**kept, key: name})  # type: ignore[no-untyped-call]
+
+        def _remove_old(self) -> None:
+            for old in Path(self._cache_path).glob(f"{Path(self._index_name).stem}.*.nbc"):
+                old.unlink(missing_ok=True)
 
     class SourcesCache(FunctionCache):
         """numba's cache on disk, valid only as long as none of our sources changes."""
 
         def __init__(self, function: Callable[..., object]) -> None:
-            super().__init__(function)  # type: ignore[no-untyped-call]  # numba has no types
+            super().__init__(function)  # type: ignore[no-untyped-call]  # as above
             folder = Path(inspect.getfile(function)).parent
             sources = numba.__version__, _digest(folder), _digest(Path(__file__).parent)
-            # If the version differs, numba does not read the rest, whose classes may be gone.
-            self._cache_file._version = self._cache_file._source_stamp = sources
+            files = Files(self._cache_path, self._impl.filename_base, sources)  # type: ignore[no-untyped-call]
+            files._version = sources  # where it differs, numba does not read classes that are gone
+            self._cache_file = files
 
         def load_overload(self, sig: Any, target_context: Any) -> Any:
             """The code on disk; None if there is none, and it has to be compiled."""
-            found = super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]  # as above
+            # numba's would first load what only its compiler needs, all of scipy.linalg included.
+            rtsys.initialize(target_context)  # for code that makes arrays
+            with self._guard_against_spurious_io_errors():
+                found = self._load_overload(sig, target_context)  # type: ignore[no-untyped-call]
             if found is None:
                 _announce()
             return found

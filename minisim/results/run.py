@@ -129,27 +129,16 @@ class Run:
     @cached_property
     def safety(self) -> Mapping[str, float | int | None]:
         """The closest calls in and near the junction; see `minisim.results.safety`."""
-        from minisim.results.safety import safety_summary
+        from minisim.results.safety import summary_of
 
-        run = self.counted
-        return safety_summary(run.near_junction.trajectories, self.site, run.encounters)
+        return summary_of(self.counted.encounters)
 
     @cached_property
     def encounters(self) -> Encounters:
-        """Each encounter of two vehicles in and near the junction; likewise."""
-        from minisim.results.safety import encounters
+        """Each encounter of two vehicles in and near the junction; `InputError` if not recorded."""
+        from minisim.results.safety import encounters_of
 
-        return encounters(self.near_junction.trajectories, self.site)
-
-    @cached_property
-    def near_junction(self) -> Run:
-        """The run with what `record="junction"` keeps of its recording."""
-        from minisim.laws import RECORD_BEFORE, RECORD_PAST
-
-        paths, s = self.site.intersection.paths, self.trace["s"]
-        last = np.array([path.exit + RECORD_PAST for path in paths])
-        past = s > last[self.rows["path"][self.trace["row"]]]
-        return replace(self, trace=self.trace[(s >= paths[0].entry - RECORD_BEFORE) & ~past])
+        return encounters_of(self)
 
     def summary(
         self, metrics: str | Iterable[Asked] = (), by: Iterable[str] = ()
@@ -201,16 +190,23 @@ class Run:
 
         return as_html(self)
 
+    @property
+    def recorded(self) -> tuple[Records, Records]:
+        """The recording by time, then vehicle, and what each of it is of: `trace` and `rows`.
+
+        Raises `InputError` if nothing was recorded.
+        """
+        if self.record is None:
+            raise InputError("no trajectories: simulate with record='junction' or record='all'")
+        trace = self.trace[np.lexsort((self.rows["id"][self.trace["row"]], self.trace["tick"]))]
+        return trace, self.rows[trace["row"]]
+
     @cached_property
     def trajectories(self) -> pd.DataFrame:
         """One row per vehicle and step, the warm-up's too; `InputError` if not recorded."""
         import pandas as pd
 
-        if self.record is None:
-            raise InputError("no trajectories: simulate with record='junction' or record='all'")
-        trace = self.trace
-        trace = trace[np.lexsort((self.rows["id"][trace["row"]], trace["tick"]))]
-        rows = self.rows[trace["row"]]
+        trace, rows = self.recorded
         intersection, types = self.site.intersection, self.site.types
         movements, path_of = intersection.movements, rows["path"]
         front, heading = np.zeros((2, len(trace), 2))

@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-import pandas as pd
 
 from minisim.control import Site
 from minisim.errors import instance
@@ -42,7 +41,12 @@ from minisim.results.trajectories import (
 from minisim.results.trips import Ints
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from minisim.results.run import Run
+
+#: The columns of a table.
+Columns = dict[str, npt.NDArray[Any]]
 
 #: An encounter is critical below these [s] (van der Horst 1990, A time-based analysis of road user
 #: behaviour in normal and critical encounters), or above this [m/s²] (what is comfortable, as in
@@ -54,7 +58,7 @@ _FAR = 1e6
 
 
 class Rows(NamedTuple):
-    """A trajectory frame as arrays, sorted by time, then by vehicle; shape (rows,) each."""
+    """A recording as arrays, sorted by time, then by vehicle; shape (rows,) each."""
 
     time: Floats
     step: Ints
@@ -64,41 +68,62 @@ class Rows(NamedTuple):
     length: Floats
     s: Floats
     v: Floats
+    a: Floats
     goes: Bools
 
 
 class Encounters(NamedTuple):
-    """The tables of `following`, `encroachments` and `crossings`."""
+    """The columns of `following`, `encroachments` and `crossings`, and all accelerations [m/s²]."""
 
-    follow: pd.DataFrame
-    encroach: pd.DataFrame
-    cross: pd.DataFrame
-
-
-def encounters(frame: pd.DataFrame, site: Site) -> Encounters:
-    """The encounters in a recording; raises `InputError` as `safety_summary`."""
-    rows = _rows(frame, site)
-    return Encounters(following(rows, site), encroachments(rows, site), crossings(rows, site))
+    follow: Columns
+    encroach: Columns
+    cross: Columns
+    a: Floats
 
 
-def safety_summary(
-    frame: pd.DataFrame, site: Site, found: Encounters | None = None
-) -> dict[str, float | int | None]:
+def safety_summary(frame: pd.DataFrame, site: Site) -> dict[str, float | int | None]:
     """The closest calls in a recording; None if nothing of the kind happened.
 
     `min_ttc_s` is of following and crossing, `max_drac_mps2` of following; `pets` counts all
     encroachments, others the short ones (`minisim.results.metrics.PETS`). Raises `InputError` for
     a missing column, or a movement that the site does not have.
     """
-    follow, encroach, cross = found or encounters(frame, site)
-    pets = encroach["pet_s"]
-    ttc = np.concatenate([follow["ttc_s"], cross["ttc_s"]])
-    braking = -frame[ACCELERATION].to_numpy(dtype=float)
+    return summary_of(_encounters(_rows(frame, site), site))
+
+
+def encounters_of(run: Run) -> Encounters:
+    """Those in what `record="junction"` keeps; raises `InputError` without a recording.
+
+    It makes no frame, since pandas takes longer to load than a run to be measured.
+    """
+    from minisim.laws import RECORD_BEFORE, RECORD_PAST
+
+    trace, rows = run.recorded
+    paths = run.site.intersection.paths
+    last = np.array([path.exit + RECORD_PAST for path in paths])[rows["path"]]
+    near = (trace["s"] >= paths[0].entry - RECORD_BEFORE) & (trace["s"] <= last)
+    trace, rows = trace[near], rows[near]
+    recording = _recording(
+        run.site, np.round(trace["tick"] * run.site.dt, 6), rows["id"], rows["path"], rows["type"],
+        trace["s"], trace["v"], trace["a"], trace["released"] != 0,
+    )  # fmt: skip
+    return _encounters(recording, run.site)
+
+
+def _encounters(rows: Rows, site: Site) -> Encounters:
+    tables = _following(rows, site), _encroachments(rows, site), _crossings(rows, site)
+    return Encounters(*tables, rows.a)
+
+
+def summary_of(found: Encounters) -> dict[str, float | int | None]:
+    """The closest calls among encounters, see `safety_summary`."""
+    follow, pets = found.follow, found.encroach["pet_s"]
+    ttc = np.concatenate([follow["ttc_s"], found.cross["ttc_s"]])
     return {
         "min_ttc_s": _extreme(np.min, ttc),
         "min_pet_s": _extreme(np.min, pets),
         "max_drac_mps2": _extreme(np.max, follow["drac_mps2"]),
-        "max_braking_mps2": _extreme(np.max, np.maximum(braking, 0.0)),
+        "max_braking_mps2": _extreme(np.max, np.maximum(-found.a, 0.0)),
         "pets": len(pets),
         **{name: int((pets < limit).sum()) for name, limit in PETS.items()},
     }
@@ -106,7 +131,7 @@ def safety_summary(
 
 def short_ttc(run: Run) -> Floats:
     """1 for each vehicle with a TTC below `SHORT_TTC` as follower or second, else 0, shape (k,)."""
-    follow, _, cross = run.encounters
+    follow, cross = run.encounters.follow, run.encounters.cross
     late = (
         follow["follower"][follow["ttc_s"] < SHORT_TTC],
         cross["second"][cross["ttc_s"] < SHORT_TTC],
@@ -130,33 +155,39 @@ def _flags(run: Run, vehicles: npt.ArrayLike) -> Floats:
     return np.isin(run.columns.vehicle, vehicles).astype(float)
 
 
-def following(frame: pd.DataFrame | Rows, site: Site) -> pd.DataFrame:
+def following(frame: pd.DataFrame, site: Site) -> pd.DataFrame:
     """Each follower and its leader at each step.
 
     Columns `time_s, follower, leader, gap_m, closing_mps, ttc_s, drac_mps2`. TTC is NaN while not
     closing, and 0 where bodies overlap. DRAC is NaN without a gap.
     """
-    rows = _rows(frame, site)
+    return _frame(_following(_rows(frame, site), site))
+
+
+def _following(rows: Rows, site: Site) -> Columns:
     in_lane, to_exit = _leaders_in_lane(rows, site), _leaders_to_exit(rows, site)
     follower, leader, gap = (np.concatenate(both) for both in zip(in_lane, to_exit, strict=True))
     closing = rows.v[follower] - rows.v[leader]
     with np.errstate(divide="ignore", invalid="ignore"):
         ttc = np.where(closing > 0.0, np.maximum(gap, 0.0) / closing, np.nan)
         drac = np.where((closing > 0.0) & (gap > 0.0), closing**2 / (2.0 * gap), np.nan)
-    return pd.DataFrame({
+    return {
         "time_s": rows.time[follower], "follower": rows.vehicle[follower],
         "leader": rows.vehicle[leader], "gap_m": gap, "closing_mps": closing, "ttc_s": ttc,
         "drac_mps2": drac,
-    })  # fmt: skip
+    }  # fmt: skip
 
 
-def encroachments(frame: pd.DataFrame | Rows, site: Site) -> pd.DataFrame:
+def encroachments(frame: pd.DataFrame, site: Site) -> pd.DataFrame:
     """Each pair of vehicles that pass a conflict area of two movements one after the other.
 
     A vehicle still inside when its recording ends counts as leaving then; one whose entry was not
     recorded does not count. Columns `time_s` (the second enters; sorted), `first, second, pet_s`.
     """
-    rows = _rows(frame, site)
+    return _frame(_encroachments(_rows(frame, site), site))
+
+
+def _encroachments(rows: Rows, site: Site) -> Columns:
     areas = _areas(site)
     vehicle, movement, enter, leave = _passages(rows, areas)
     by_movement = [np.flatnonzero(movement == p) for p in range(areas.enter.shape[1])]
@@ -171,14 +202,20 @@ def encroachments(frame: pd.DataFrame | Rows, site: Site) -> pd.DataFrame:
         first, second = order[:-1][changes], order[1:][changes]
         ids = vehicle[passing[first]], vehicle[passing[second]]
         pairs.append(np.stack([start[second], *ids, start[second] - end[first]], axis=-1))
-    table = pd.DataFrame(np.concatenate(pairs), columns=["time_s", "first", "second", "pet_s"])
-    table = table.sort_values("time_s", kind="stable", ignore_index=True)
-    return table.astype({"first": np.int64, "second": np.int64})
+    table = np.concatenate(pairs)
+    time, first, second, pet = table[np.argsort(table[:, 0], kind="stable")].T
+    return {
+        "time_s": time, "first": first.astype(np.int64), "second": second.astype(np.int64),
+        "pet_s": pet,
+    }  # fmt: skip
 
 
-def crossings(frame: pd.DataFrame | Rows, site: Site) -> pd.DataFrame:
+def crossings(frame: pd.DataFrame, site: Site) -> pd.DataFrame:
     """Each step with two vehicles on a crossing course: `time_s, first, second, ttc_s`."""
-    rows = _rows(frame, site)
+    return _frame(_crossings(_rows(frame, site), site))
+
+
+def _crossings(rows: Rows, site: Site) -> Columns:
     areas = _areas(site)
     clear = np.array([path.exit for path in site.intersection.paths])[rows.movement] + rows.length
     going = np.flatnonzero(rows.goes & (rows.s < clear))
@@ -203,29 +240,39 @@ def crossings(frame: pd.DataFrame | Rows, site: Site) -> pd.DataFrame:
         ttcs.append(late[course])
         ahead += 1
     first, second = _join(firsts), _join(seconds)
-    return pd.DataFrame({
+    return {
         "time_s": rows.time[first], "first": rows.vehicle[first], "second": rows.vehicle[second],
         "ttc_s": _join(ttcs, np.float64),
-    })  # fmt: skip
+    }  # fmt: skip
 
 
-def _rows(frame: pd.DataFrame | Rows, site: Site) -> Rows:
-    if isinstance(frame, Rows):
-        return frame
+def _frame(columns: Columns) -> pd.DataFrame:
+    import pandas as pd
+
+    return pd.DataFrame(columns)
+
+
+def _rows(frame: pd.DataFrame, site: Site) -> Rows:
     instance("site", site, Site)
     check_columns(frame)
     frame = frame.sort_values([TIME, VEHICLE])
-    time, s, speed = (frame[name].to_numpy(dtype=float) for name in (TIME, S, SPEED))
-    movement = movement_index(frame, site)
-    entries = np.array([path.entry for path in site.intersection.paths])
+    time, s, v, a = (frame[k].to_numpy(dtype=float) for k in (TIME, S, SPEED, ACCELERATION))
     type = np.zeros(len(frame), int)
     if TYPE in frame.columns:
         type = site.fleet.indices(frame[TYPE].to_numpy(dtype=str))
+    vehicle, released = frame[VEHICLE].to_numpy(np.int64), frame[RIGHT_OF_WAY].to_numpy(bool)
+    return _recording(site, time, vehicle, movement_index(frame, site), type, s, v, a, released)
+
+
+def _recording(
+    site: Site, time: Floats, vehicle: Ints, movement: Ints, type: Ints, s: Floats, v: Floats,
+    a: Floats, released: Bools,
+) -> Rows:  # fmt: skip
+    entries = np.array([path.entry for path in site.intersection.paths])
     return Rows(
-        time=time, step=np.cumsum(np.diff(time, prepend=time[:1]) > 0.0),
-        vehicle=frame[VEHICLE].to_numpy(dtype=np.int64), movement=movement, s=s, v=speed,
-        type=type, length=np.array([it.length for it in site.types])[type],
-        goes=frame[RIGHT_OF_WAY].to_numpy(dtype=bool) | (s >= entries[movement]),
+        time, np.cumsum(np.diff(time, prepend=time[:1]) > 0.0), vehicle, movement, type,
+        np.array([it.length for it in site.types])[type], s, v, a,
+        released | (s >= entries[movement]),
     )  # fmt: skip
 
 

@@ -7,7 +7,6 @@ from typing import Annotated
 import typer
 
 from minisim.errors import InputError, choice
-from minisim.fleet import TYPES
 from scenarios.cli.shared import options
 from scenarios.cli.shared.app import app
 from scenarios.cli.shared.proof import Plot, answer, closed, decision_text, junction, names
@@ -54,6 +53,7 @@ def decide(
     if plot is not None:
         from figures.junction.decision import decision_figure
         from figures.style import save
+        from minisim.fleet import TYPES
 
         site = what.site()
         known = {**TYPES, **{it.name: it for it in site.types}}

@@ -8,7 +8,6 @@ import typer
 from rich.text import Text
 
 from minisim.errors import InputError
-from minisim.junction.conflicts import CLEARANCE
 from scenarios.cli.shared import options
 from scenarios.cli.shared.app import app
 from scenarios.cli.shared.proof import answer, closed, harmony_table, junction
@@ -27,14 +26,17 @@ def harmony(
     fleet: options.Fleet = None,
     lane_width: options.LaneWidth = None,
     clearance: Annotated[
-        float, typer.Option(metavar="M", help="Room between the paths of two bodies in metres.")
-    ] = CLEARANCE,
+        float | None, options.option("Room between the paths of two bodies; 0.5 by default.", "M")
+    ] = None,
     csv: Annotated[bool, typer.Option("--csv", help="Print the matrix as CSV.")] = False,
     as_json: options.AsJson = False,
 ) -> None:  # fmt: skip
     """Print which movements can be driven together: the harmony matrix."""
     if csv and as_json:
         raise InputError("--csv and --json cannot be combined; give one")
+    from minisim.junction.conflicts import CLEARANCE
+
+    clearance = CLEARANCE if clearance is None else clearance
     what, matrix = junction(
         scenario, bearings, clearance, side=side, node=node, profile=profile, fleet=fleet,
         lane_width=lane_width,

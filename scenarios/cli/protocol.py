@@ -9,7 +9,6 @@ import typer
 
 from minisim.errors import InputError
 from minisim.files import check_file
-from minisim.junction.movements import ARM_NAMES
 from scenarios.cli.shared import options
 from scenarios.cli.shared.app import app
 from scenarios.cli.shared.proof import answer, closed, junction, names, protocol_text
@@ -71,6 +70,7 @@ def protocol(
     """Visit every state: is DIM safe, can it get stuck, which lanes starve? (3 and 4 arms)"""
     from dim.proofs.modelcheck import explore, starvation
     from dim.proofs.protocol import Protocol
+    from minisim.junction.movements import ARM_NAMES
 
     if counterexample is not None:
         check_file(counterexample, ".csv")

@@ -69,7 +69,6 @@ def run(
     from scenarios.controllers import controller_named
     from scenarios.loading import metrics_named
     from scenarios.recipe import Recipe
-    from scenarios.sweep.rows import identity_of
 
     check_apart({
         "--arrivals": arrivals, "--demand": demand, "--trips": trips,
@@ -108,6 +107,8 @@ def run(
         result = recipe.run(simulate_in_sumo if host == "sumo" else simulate, **recording)
     except CollisionError as error:
         if as_json:
+            from scenarios.sweep.rows import identity_of
+
             touched = [collision._asdict() for collision in error.collisions]
             facts = {"collisions": len(touched), "touched": touched, "error": str(error)}
             show_json(identity_of(recipe) | facts)

@@ -44,8 +44,8 @@ def sweep(
         recipes: what to run.
         executor: any `concurrent.futures.Executor`, such as
             `dask.distributed.Client.get_executor()`; it stays open. None means a pool of
-            processes for this call, spawned, so a script needs `if __name__ == "__main__":`. Only
-            the column `cpu_s` depends on the executor.
+            processes for this call, so a script needs `if __name__ == "__main__":`. Only the column
+            `cpu_s` depends on the executor.
         progress: called in this process with the numbers of finished runs and of all runs.
         jobs: processes of the pool, one per core by default; 1 runs in this process.
         store: keeps each row as it comes; rows that it has are not computed again.
@@ -62,8 +62,9 @@ def sweep(
         InputError: not a `Recipe` or `Store`, or a controller or metric that cannot go to another
             process.
         FileError: the store cannot be written; what it has stays.
-        ExecutorError: your executor gave runs up, such as a cluster whose scheduler died. Finished
-            runs are in the store. Without a store, the rows of the others say so.
+        ExecutorError: no process can be started, as in a script without that line; or your executor
+            gave runs up, such as a cluster whose scheduler died. Finished runs are in the store.
+            Without a store, the rows of the others say so.
     """
     import pandas as pd
 
@@ -149,4 +150,5 @@ def _warm(recipes: Iterable[Recipe], pool: Executor) -> None:
             tried = handed(pool, outcome_of, replace(recipe, scenario=scenario))
         except BrokenExecutor:
             return
-        tried.exception()
+        if isinstance(error := tried.exception(), ExecutorError):
+            raise error

@@ -1,19 +1,9 @@
-"""CPU time of a simulated hour, minisim against SUMO, as ratios measured in one run.
+"""How fast minisim is, and by how much it beats SUMO and C, measured in one run.
 
-    python tests/bench/bench.py [--runs 5]
+    python -m tests.bench.bench [--runs 5] [--append FILE] [--quick]
 
-DIM on 4 arms at 350 veh/h/lane and dt 0.1 s in minisim, against SUMO on the same arrivals:
-
-- libsumo stepping SUMO's own junction while Python reads every vehicle's position and speed at
-  each step: an all-way stop, whose queues are the shortest, so that it moves the fewest vehicles
-  (DIM's own queues are longer), and a priority junction, netconvert's default;
-- libsumo hosting the very same controller (`minisim.sumo`).
-
-And a fixed-time signal with Webster's greens, on the same arrivals: minisim's against the bare
-`sumo` binary with a static program, no Python and no output.
-
-All are CPU seconds of warm processes, but for the `sumo` binary, whose start (a twentieth of a
-second) counts; without libsumo only ours is printed.
+Medians of several runs, with the fastest and the slowest. CPU seconds, but for two workers and the
+first run, which are wall time and mean something only on an otherwise idle machine.
 """
 
 from __future__ import annotations
@@ -21,179 +11,170 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import platform
 import statistics
 import subprocess
-import sys
-import tempfile
-import time
+from collections.abc import Callable, Iterator, Sequence
+from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
-from xml.etree import ElementTree
+from typing import NamedTuple
 
-BUDGET, BARE_BUDGET = 30.0, 10.0
+from tests import ROOT
+from tests.bench import engine, rivals, starting
 
-#: Options of every run of SUMO.
-STEPPED = ["--step-length", "0.1", "--time-to-teleport", "-1"]
-STEPPED += ["--no-step-log", "true", "--no-warnings", "true"]
+DENSITIES = (150, 250, 350, 500, 650, 800)
 
 
-def main() -> None:
+class Figure(NamedTuple):
+    """What was measured, run by run, and what is wanted: at least, or if negative at most."""
+
+    key: str
+    label: str
+    values: Sequence[float]
+    unit: str
+    wanted: float | None = None
+
+    @property
+    def median(self) -> float:
+        return statistics.median(self.values)
+
+    def over(self, other: Figure, key: str, label: str, wanted: float) -> Figure:
+        """This figure in units of another's median."""
+        ratios = [value / other.median for value in self.values]
+        return Figure(key, label, ratios, "×", wanted)
+
+    def __str__(self) -> str:
+        spread = f"{min(self.values):.4g} … {max(self.values):.4g}"
+        line = f"{self.label:<44}{self.median:>9.4g} {self.unit:<5}{spread:>20}"
+        if self.wanted is None:
+            return line
+        met = self.median >= self.wanted if self.wanted > 0 else self.median <= -self.wanted
+        bound = f"{'≥' if self.wanted > 0 else '≤'} {abs(self.wanted):g}"
+        return f"{line}   {bound:>7}: {'yes' if met else 'NO'}"
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--runs", type=int, default=5, help="measured runs of minisim")
-    parser.add_argument("--sumo", metavar="FOLDER", help=argparse.SUPPRESS)
-    options = parser.parse_args()
-    if options.sumo:
-        _step_sumo(Path(options.sumo))
+    parser.add_argument("--runs", type=int, default=5, help="of which each figure is the median")
+    parser.add_argument("--append", type=Path, metavar="FILE", help="add a line of JSON to it")
+    parser.add_argument("--quick", action="store_true", help="a taste, without what is slow")
+    options = parser.parse_args(arguments)
+    load = os.getloadavg()[0] if hasattr(os, "getloadavg") else float("nan")
+    print(f"{_processor()}, {os.cpu_count()} cores, load {load:.1f}, commit {_commit()}")
+    made = []
+    for figure in _taste() if options.quick else _figures(options.runs):
+        print(figure, flush=True)
+        made.append(figure)
+    if options.append is not None:
+        line = {
+            "date": datetime.now(UTC).isoformat(timespec="seconds"), "commit": _commit(),
+            "processor": _processor(), "load": load, **{it.key: it.median for it in made},
+        }  # fmt: skip
+        with options.append.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(line) + "\n")
+
+
+def _figures(runs: int) -> Iterator[Figure]:
+    def measured(of: Callable[[int], float]) -> list[float]:
+        return [of(seed) for seed in range(runs + 1)][1:]  # the first one warms up
+
+    hour = Figure("dim_hour_s", "DIM, a simulated hour", measured(engine.hour), "s")
+    signal = Figure("fixed_time_hour_s", "fixed-time signal, a simulated hour",
+                    measured(lambda seed: engine.hour(seed, "fixed-time")), "s")  # fmt: skip
+    yield from (hour, signal)
+    yield Figure("harmonious_hour_s", "harmonious gate, a simulated hour",
+                 measured(lambda seed: engine.hour(seed, "dim:gate=harmonious")), "s")  # fmt: skip
+    yield from _rivals(runs, hour, signal)
+    yield from _steps(measured)
+    yield Figure("minutes_per_s", "one-minute runs", measured(engine.minutes), "/s", 1500.0)
+    for arms, most in ((4, 10.0), (8, 45.0), (12, 180.0)):
+        times = measured(lambda seed, arms=arms: engine.junction(seed, arms))  # type: ignore[misc]
+        yield Figure(f"junction_{arms}_ms", f"new junction of {arms} arms", times, "ms", -most)
+    yield from _starts(runs)
+
+
+def _taste() -> Iterator[Figure]:
+    """Of every kind that needs no SUMO, no compiling and no second process."""
+    hours = [engine.hour(seed, horizon=60.0) for seed in (0, 1)][1:]
+    yield Figure("dim_hour_s", "DIM, a simulated hour", hours, "s")
+    step = Figure("step_350_ns", "vehicle-step", [engine.vehicle_step(1, 350, 60.0)], "ns")
+    yield step
+    yield from _against_c(step, [engine.ring_step(1000)])
+    yield Figure("minutes_per_s", "one-minute runs", [engine.minutes(1, 2)], "/s")
+    yield Figure("junction_4_ms", "new junction of 4 arms", [engine.junction(1, 4)], "ms")
+    yield Figure("help_s", "minisim --help", [starting.command("--help")], "s")
+
+
+def _rivals(runs: int, hour: Figure, signal: Figure) -> Iterator[Figure]:
+    home = rivals.sumo_home()
+    if home is None:
+        print("SUMO is not installed (pip install 'minisim[sumo]'): not compared")
         return
-    ours = [_minisim_hour(seed) for seed in range(options.runs + 1)][1:]
-    median = statistics.median(ours)
-    spread = f"{min(ours):.3f} … {max(ours):.3f}"
-    print(f"minisim, DIM, 4 arms × 350 veh/h: {median:7.3f} s CPU per simulated hour ({spread})")
-    try:
-        import libsumo  # noqa: F401
-        import sumo
-    except ImportError:
-        print("libsumo is not installed (pip install 'minisim[sumo]'): no comparison")
-        return
-    home = Path(sumo.SUMO_HOME)
-    rivals = {
-        "libsumo, all-way stop, all read": _sumo_hour(home, "allway_stop"),
-        "libsumo, priority, all read": _sumo_hour(home, "priority"),
-        "libsumo hosting the same DIM": _hosted_hour(),
-    }
-    for name, seconds in rivals.items():
-        _compare(name, seconds, median, BUDGET)
-    signals = [_minisim_hour(seed, "fixed-time") for seed in range(options.runs + 1)][1:]
-    signal = statistics.median(signals)
-    print(f"minisim, fixed-time, the same:    {signal:7.3f} s CPU per simulated hour")
-    bare = statistics.median(_bare_hour(home) for _ in range(3))
-    _compare("sumo binary, fixed-time", bare, signal, BARE_BUDGET)
-    _compare("the same against minisim's DIM", bare, median, BARE_BUDGET)
-
-
-def _compare(name: str, seconds: float, ours: float, budget: float) -> None:
-    ratio = seconds / ours
-    verdict = "within" if ratio >= budget else "MISSED"
-    print(f"{name + ':':<33}{seconds:7.2f} s, {ratio:4.0f}× (budget {budget:.0f}×: {verdict})")
-
-
-def _minisim_hour(seed: int, controller: str = "dim") -> float:
-    import minisim
-    from scenarios import four_way
-    from scenarios.controllers import controller_named
-
-    scenario = four_way(density=350, profile="fair")
-    start = time.process_time()
-    minisim.simulate(scenario, controller_named(controller, "fair"), seed=seed).summary()
-    return time.process_time() - start
-
-
-def _bare_hour(home: Path) -> float:
-    """The `sumo` binary alone: children's CPU time, from start to exit."""
-    with tempfile.TemporaryDirectory() as folder:
-        _write_network(Path(folder), home, "traffic_light")
-        _write_routes(Path(folder))
-        _write_signal(Path(folder))
-        command = [home / "bin" / "sumo", "-n", "x.net.xml", "-r", "x.rou.xml", "-a", "x.add.xml"]
-        before = os.times()
-        _run([*command, "--end", "3600", *STEPPED], home, cwd=folder)
-        after = os.times()
-    return after.children_user + after.children_system - before[2] - before[3]
-
-
-def _run(command: list[Any], home: Path, **options: Any) -> str:
-    environment = {**os.environ, "SUMO_HOME": str(home)}
-    options |= {"check": True, "capture_output": True, "text": True, "env": environment}
-    return str(subprocess.run(command, **options).stdout)
-
-
-def _write_signal(folder: Path) -> None:
-    """One phase per arm in turn, with the greens and ambers of minisim's fixed-time signal."""
-    from baselines import FixedTime
-    from scenarios import four_way
-
-    controller = FixedTime()
-    greens = controller.timing(four_way(density=350, profile="fair").site()).greens
-    network = ElementTree.parse(folder / "x.net.xml").getroot()
-    links = {
-        int(connection.get("linkIndex", "")): connection.get("from", "")[0]
-        for connection in network.iter("connection")
-        if connection.get("tl") == "C"
-    }
-    phases = []
-    for arm, green in zip("abcd", greens, strict=True):
-        for seconds, colour in ((green, "G"), (controller.amber, "y")):
-            state = "".join(colour if links[i] == arm else "r" for i in sorted(links))
-            phases.append(f'<phase duration="{seconds:.3f}" state="{state}"/>')
-    program = '<tlLogic id="C" type="static" programID="webster" offset="0">'
-    head = f"<additional>{program}{''.join(phases)}"
-    (folder / "x.add.xml").write_text(f"{head}</tlLogic></additional>")
-
-
-def _hosted_hour() -> float:
-    from dim import Dim
-    from minisim.sumo import simulate
-    from scenarios import four_way
-
-    before = os.times()
-    simulate(four_way(density=350, profile="fair"), Dim(), seed=1)
-    return sum(os.times()[:4]) - sum(before[:4])  # this process and its children
-
-
-def _sumo_hour(home: Path, junction: str) -> float:
-    with tempfile.TemporaryDirectory() as folder:
-        _write_network(Path(folder), home, junction)
-        _write_routes(Path(folder))
-        printed = _run([sys.executable, __file__, "--sumo", folder], home)
-    return float(json.loads(printed.splitlines()[-1]))
-
-
-def _write_network(folder: Path, home: Path, junction: str) -> None:
-    """The 4-arm left-hand junction as netconvert reads it: arms of 500 m, 14 m/s."""
-    ends = {"a": (0, 500), "b": (500, 0), "c": (0, -500), "d": (-500, 0)}
-    nodes = [f'<node id="C" x="0" y="0" type="{junction}"/>']
-    edges = []
-    for arm, (x, y) in ends.items():
-        nodes.append(f'<node id="{arm}" x="{x}" y="{y}" type="dead_end"/>')
-        for name, origin, target in ((f"{arm}in", arm, "C"), (f"{arm}out", "C", arm)):
-            ends_of = f'from="{origin}" to="{target}"'
-            edges.append(f'<edge id="{name}" {ends_of} numLanes="1" speed="14"/>')
-    (folder / "x.nod.xml").write_text(f"<nodes>{''.join(nodes)}</nodes>")
-    (folder / "x.edg.xml").write_text(f"<edges>{''.join(edges)}</edges>")
-    command = [home / "bin" / "netconvert", "-n", "x.nod.xml", "-e", "x.edg.xml", "-o", "x.net.xml"]
-    _run([*command, "--lefthand", "true", "--no-turnarounds", "true"], home, cwd=folder)
-
-
-def _write_routes(folder: Path) -> None:
-    from scenarios import four_way
-
-    arrivals = four_way(density=350, profile="fair").arrivals(seed=1)
-    lines = ['<routes><vType id="car" carFollowModel="IDM" speedDev="0"/>']
-    for i in range(len(arrivals)):
-        origin = arrivals.lane[i]
-        target = (origin + arrivals.manoeuvre[i]) % 4
-        lines.append(
-            f'<vehicle id="{i}" type="car" depart="{arrivals.time[i]}" departSpeed="max">'
-            f'<route edges="{"abcd"[origin]}in {"abcd"[target]}out"/></vehicle>'
+    compared: list[tuple[str, str, Callable[[], float], Figure, float]] = [
+        ("hosting", "libsumo hosting the same DIM / DIM", rivals.hosted_hour, hour, 200.0),
+        ("all_way_stop", "libsumo, all-way stop, all read / DIM",
+         lambda: rivals.stepped_hour(home, "allway_stop"), hour, 50.0),
+        ("priority", "libsumo, priority, all read / DIM",
+         lambda: rivals.stepped_hour(home, "priority"), hour, 50.0),
+        ("bare_sumo", "sumo, fixed-time / ours", lambda: rivals.bare_hour(home), signal, 50.0),
+    ]  # fmt: skip
+    for key, label, of, ours, wanted in compared:
+        theirs = Figure(
+            f"{key}_hour_s", label.partition(" / ")[0], [of() for _ in range(runs)], "s"
         )
-    (folder / "x.rou.xml").write_text("\n".join([*lines, "</routes>"]))
+        yield theirs
+        yield theirs.over(ours, f"{key}_ratio", label, wanted)
 
 
-def _step_sumo(folder: Path) -> None:
-    import libsumo
+def _steps(measured: Callable[[Callable[[int], float]], list[float]]) -> Iterator[Figure]:
+    for density in DENSITIES:
+        times = measured(lambda seed, density=density: engine.vehicle_step(seed, density))  # type: ignore[misc]
+        wanted = {350: -16.0, 800: -10.0}.get(density)
+        label = f"vehicle-step of the kernel, {density} veh/h/lane"
+        step = Figure(f"step_{density}_ns", label, times, "ns", wanted)
+        yield step
+    yield from _against_c(step, [engine.ring_step() for _ in times])
 
-    command = ["sumo", "-n", str(folder / "x.net.xml"), "-r", str(folder / "x.rou.xml")]
-    libsumo.start([*command, *STEPPED])
-    start = time.process_time()
-    metres = 0.0
-    for _ in range(36_000):
-        libsumo.simulationStep()
-        for vehicle in libsumo.vehicle.getIDList():
-            x, _y = libsumo.vehicle.getPosition(vehicle)
-            metres += x + libsumo.vehicle.getSpeed(vehicle)
-    elapsed = time.process_time() - start
-    libsumo.close()
-    print(json.dumps(elapsed))
+
+def _against_c(step: Figure, ring: list[float | None]) -> Iterator[Figure]:
+    times = [value for value in ring if value is not None]
+    if not times:
+        print("there is no C compiler: not compared with C")
+        return
+    scalar = Figure("c_step_ns", "vehicle-step of a ring road in C", times, "ns")
+    yield scalar
+    yield step.over(scalar, "c_ratio", "ours / in C", -0.6)
+
+
+def _starts(runs: int) -> Iterator[Figure]:
+    starting.command(*starting.RUN)
+    for key, label, arguments, most in (
+        ("run_s", "minisim run, warm", starting.RUN, 1.0),
+        ("help_s", "minisim --help", ("--help",), 0.3),
+    ):
+        times = [starting.command(*arguments) for _ in range(runs)]
+        yield Figure(key, label, times, "s", -most)
+    first, told = zip(*(starting.first_run() for _ in range(runs)), strict=True)
+    yield Figure("first_run_s", "first run after installation", first, "s", -7.0)
+    yield Figure("told_s", "until it says that it compiles", told, "s", -0.5)
+    for count, hours, least in ((40, 4.0, 1.85), (400, 1.0, 1.95)):
+        ratios = [starting.pair(count, hours) for _ in range(runs)]
+        label = f"two workers, {count} runs of {hours:g} h"
+        yield Figure(f"workers_{count}", label, ratios, "×", least)
+
+
+def _processor() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+        return next(line.partition(":")[2].strip() for line in lines if "model name" in line)
+    except (OSError, StopIteration):
+        return platform.processor() or platform.machine()
+
+
+def _commit() -> str:
+    command = ["git", "describe", "--always", "--dirty"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    return done.stdout.strip() or "unknown"
 
 
 if __name__ == "__main__":

@@ -14,8 +14,6 @@ from rich.text import Text
 
 from minisim.errors import plural
 from minisim.files import check_file
-from minisim.junction.conflicts import CLEARANCE
-from minisim.junction.movements import ARM_NAMES
 from scenarios.cli.shared.options import build_scenario, option
 from scenarios.cli.shared.terminal import show, show_json
 
@@ -39,14 +37,16 @@ Plot = Annotated[Path | None, option("Draw it (.png, .pdf, .svg).", "FILE", call
 
 
 def junction(
-    name: str, bearings: str | None, clearance: float = CLEARANCE, **more: Any
+    name: str, bearings: str | None, clearance: float | None = None, **more: Any
 ) -> tuple[Scenario, HarmonyMatrix]:
     """A scenario and the harmony matrix of its movements; `more` as in `build_scenario`."""
     from dim import HarmonyMatrix
+    from minisim.junction.conflicts import CLEARANCE
 
     scenario = build_scenario(name, bearings, **more)
-    vehicles = scenario.vehicles
-    return scenario, HarmonyMatrix.from_geometry(scenario.intersection, vehicles, clearance)
+    room = CLEARANCE if clearance is None else clearance
+    matrix = HarmonyMatrix.from_geometry(scenario.intersection, scenario.vehicles, room)
+    return scenario, matrix
 
 
 def closed(scenario: Scenario) -> list[str]:
@@ -109,6 +109,8 @@ def analysis_text(analysis: Analysis) -> Text:
 
 def protocol_text(name: str, search: Exploration, lassos: Sequence[Lasso | None]) -> Text:
     """Whether it is safe and live, and which lanes can wait for ever."""
+    from minisim.junction.movements import ARM_NAMES
+
     rules = search.protocol
     text = Text.assemble(
         (name, "bold"),
@@ -147,6 +149,8 @@ def protocol_text(name: str, search: Exploration, lassos: Sequence[Lasso | None]
 
 def harmony_table(matrix: HarmonyMatrix, shut: Collection[str] = ()) -> Table:
     """The matrix with one column per lane: ● harmony, · conflict, – a movement that is `shut`."""
+    from minisim.junction.movements import ARM_NAMES
+
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     table.add_column("")
     manoeuvres = range(1, matrix.n)

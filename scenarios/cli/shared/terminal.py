@@ -11,14 +11,16 @@ import textwrap
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 from rich.console import Console
 from rich.measure import Measurement
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 from rich.text import Text
+
+if TYPE_CHECKING:
+    from rich.progress import Progress
 
 #: Substitutes for what the terminal's encoding lacks: one for one, so that tables stay aligned.
 _PLAIN = str.maketrans("●·–…←±", "x.-~<~")
@@ -55,6 +57,8 @@ def bar(label: str) -> Iterator[Bar]:
     if not console.is_terminal:
         yield Bar(label, None)
         return
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
     columns = TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn()
     with Progress(*columns, console=console, transient=True) as progress:
         yield Bar(label, progress)

@@ -162,3 +162,76 @@ def test_who_waits_at_a_terminal_is_told_why(tmp_path: Path) -> None:
         os.close(reader)
     assert said[0].count("minisim: compiling, once after installation") == 1
     assert said[1] == "end"
+
+
+#: Compiles for integers, and is killed after its first file.
+KILLED = """
+import os
+from outside.caller import answer
+
+# Another process writes after this one has looked.
+type(answer._cache._cache_file)._load_index = lambda self: {}
+replace = os.replace
+
+def replacing(*names):
+    replace(*names)
+    os._exit(0)
+
+os.replace = replacing
+answer(10)
+"""
+
+
+def test_half_written_code_is_not_taken_for_other_code(tmp_path: Path) -> None:
+    """Neither for that of another signature, nor for that of new sources."""
+    tree = copied(tmp_path)
+    caller = tree / "outside" / "caller.py"
+    source = "from minisim.jit import njit\n@njit\ndef answer(x): return x // 4\n"
+    caller.write_text(source)
+    assert ask(tree) == "2.0 compiled"
+    whole = ASK.replace("10.0", "10")
+    ask(tree, KILLED)
+    assert ask(tree, whole).split()[0] == "2"
+    caller.write_text(source.replace("x // 4", "-x // 4"))
+    ask(tree, KILLED)
+    assert ask(tree, whole).split()[0] == "-3"
+
+
+def test_code_of_old_sources_does_not_stay(tmp_path: Path) -> None:
+    tree = copied(tmp_path)
+    for factor in (1.0, 2.0):
+        write(tree, factor=factor)
+        assert ask(tree) == f"{10.0 + factor} compiled"
+    assert len(list((tmp_path / "kept").rglob("caller.answer-*.nbc"))) == 1
+
+
+#: A numba without a part that it does not promise.
+OTHER_NUMBA = """
+import numba.core.caching
+del numba.core.caching.IndexDataCacheFile._save_data
+"""
+
+RUN = """
+from minisim import simulate
+from dim import Dim
+from scenarios import four_way
+print(simulate(four_way(350, horizon=60), Dim(), seed=1).columns.travel_time.tolist())
+"""
+
+
+def test_an_unknown_numba_is_told_and_compiles_without_its_inner_parts(tmp_path: Path) -> None:
+    tree = copied(tmp_path)
+    write(tree)
+    kept = {"PYTHONPATH": str(tree), "NUMBA_CACHE_DIR": str(tree / "kept")}
+    for _ in range(2):
+        done = python("-c", OTHER_NUMBA + ASK, cwd=tree, **kept)
+        assert done.stdout == "10.5 compiled\n"
+        assert "UserWarning: minisim does not know numba" in done.stderr
+    assert not (tree / "kept").exists()
+
+
+@pytest.mark.slow  # compiles the whole engine
+def test_runs_are_the_same_with_an_unknown_numba() -> None:
+    other = python("-W", "ignore", "-c", OTHER_NUMBA + RUN)
+    assert other.stderr == ""
+    assert other.stdout == python("-c", RUN).stdout

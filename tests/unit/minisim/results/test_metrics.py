@@ -20,10 +20,12 @@ from dim import Dim, NoisyPerception
 from dim.humans.mixed import Mixed
 from minisim.control import Command, Go, Plan, Radio, Unregulated, View
 from minisim.errors import InputError
+from minisim.laws import RECORD_BEFORE, RECORD_PAST
 from minisim.results.metric import Metric
 from minisim.results.metrics import MEANS, METRICS, SAFETY, TABLE, heading, metric_of
 from minisim.results.run import Run
 from minisim.results.safety import safety_summary
+from minisim.results.trajectories import movement_index
 from minisim.results.trips import Floats, Trips
 from minisim.testing import small_scenario
 from scenarios import four_way
@@ -287,8 +289,12 @@ def erring() -> tuple[Run, Run, Run]:
 def test_nothing_else_in_the_warmup_is_measured(erring: tuple[Run, Run, Run]) -> None:
     every, warm, early = erring
     pd.testing.assert_frame_equal(every.trajectories, warm.trajectories)
-    frame = every.near_junction.trajectories
-    assert warm.safety == safety_summary(frame[frame["time_s"] >= 90.0], every.site)
+    frame = every.trajectories[every.trajectories["time_s"] >= 90.0]
+    exits = np.array([path.exit for path in every.site.intersection.paths])
+    last = exits[movement_index(frame, every.site)] + RECORD_PAST
+    entry = every.site.intersection.paths[0].entry
+    frame = frame[(frame["s_m"] >= entry - RECORD_BEFORE) & (frame["s_m"] <= last)]
+    assert warm.safety == safety_summary(frame, every.site)
     assert warm.safety["pets"] < every.safety["pets"]  # type: ignore[operator]  # both are numbers
     assert early.counts["crossings"] > 0
     for name, count in warm.counts.items():

@@ -70,42 +70,6 @@ def test_giving_up_ends_what_runs() -> None:
     assert time.monotonic() - began < 20.0
 
 
-PARENT = """
-import os, time
-from scenarios.sweep.pool import workers
-if __name__ == "__main__":
-    pool = workers(2)
-    held = [pool.submit(time.sleep, 0.5) for _ in range(2)]
-    print(*{pool.submit(os.getpid).result() for _ in range(8)}, flush=True)
-    time.sleep(600)
-"""
-
-
-@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="reads /proc")
-def test_workers_end_with_a_killed_parent(tmp_path: Path) -> None:
-    script = tmp_path / "parent.py"
-    script.write_text(PARENT)
-    command = [sys.executable, script]
-    with subprocess.Popen(command, env=ENVIRONMENT, stdout=subprocess.PIPE, text=True) as parent:
-        assert parent.stdout is not None
-        pids = parent.stdout.readline().split()
-        assert pids
-        assert all(map(alive, pids))
-        parent.kill()
-    deadline = time.monotonic() + 20
-    while any(map(alive, pids)) and time.monotonic() < deadline:
-        time.sleep(0.05)
-    assert not any(map(alive, pids))
-
-
-def alive(pid: str) -> bool:
-    """Whether the process runs; one that only waits to be reaped does not."""
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except OSError:
-        return False
-
-
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT)}
 
 
