@@ -65,8 +65,8 @@ def njit_inline(function: _F) -> _F:
 
 
 def allocating(function: _F) -> _F:
-    """`njit_inner` for a function that makes arrays."""
-    return _inner(function, _nrt=True)
+    """`njit` for a function that makes arrays; other compiled code would never free them."""
+    return _compile(function, _nrt=True)
 
 
 def direct(

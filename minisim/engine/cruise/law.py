@@ -36,6 +36,9 @@ MEMORY = np.dtype(
 #: nearly 0 must slow down at once.
 FASTEST = 10000.0 / 3.6
 
+#: The most vehicles inside the junction that others look at.
+INSIDE = 64
+
 
 class Cruise(NamedTuple):
     """What a run of `minisim.vehicle.CruiseVehicle` needs besides `Law` (SI units).
@@ -52,6 +55,7 @@ class Cruise(NamedTuple):
         memory: (k,) of `MEMORY`.
         type: the only type of the vehicles.
         last: (n,): last row that entered the exit lane of each arm, or -1.
+        inside: (INSIDE,): scratch space for the rows of the vehicles inside the junction.
     """
 
     cruise_speed: float
@@ -76,6 +80,7 @@ class Cruise(NamedTuple):
     memory: Records
     type: Traits
     last: Ints
+    inside: Ints
 
 
 def build_cruise(site: Site, count: int, teleports: bool = False) -> Cruise | None:
@@ -112,6 +117,7 @@ def build_cruise(site: Site, count: int, teleports: bool = False) -> Cruise | No
         memory=memory,
         type=traits_of(site.vehicle),
         last=np.full(intersection.n, -1),
+        inside=np.zeros(INSIDE, np.int64),
     )
 
 

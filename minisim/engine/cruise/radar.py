@@ -5,20 +5,15 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-
 from minisim.carfollowing import braking_distance
 from minisim.control import HALTING
 from minisim.engine.cruise.law import Cruise, follow
 from minisim.engine.state import DRIVING, Floats, Ints, Records
-from minisim.jit import allocating, njit_inline, njit_inner
+from minisim.jit import njit_inline, njit_inner
 from minisim.junction.meetings import Meeting
 from minisim.laws import KRAUSS, Law, krauss_stop
 from minisim.ticks import NEVER
 from minisim.vehicle import POSITION_EPS
-
-#: The most vehicles inside the junction at once.
-INSIDE = 64
 
 NOWHERE, JOIN, PART = int(Meeting.NOWHERE), int(Meeting.JOIN), int(Meeting.PART)
 CROSS, WAIT = int(Meeting.CROSS), int(Meeting.WAIT)
@@ -35,11 +30,10 @@ class Ahead(NamedTuple):
     tail: float  # the last one on its exit
 
 
-@allocating
-def gather(vehicles: Records, lanes: Records, ends: Floats, law: Law, cruise: Cruise) -> Ints:
-    """The rows of the vehicles at least partly in the junction."""
-    inside = np.empty(INSIDE, np.int64)
-    count = 0
+@njit_inner
+def gather(vehicles: Records, lanes: Records, ends: Floats, law: Law, cruise: Cruise) -> int:
+    """Note the rows of the vehicles at least partly in the junction; returns how many they are."""
+    inside, count = cruise.inside, 0
     for lane in range(len(lanes)):
         for i in range(lanes[lane]["first"], lanes[lane]["next"]):
             s, p = vehicles[i]["s"], vehicles[i]["path"]
@@ -54,7 +48,7 @@ def gather(vehicles: Records, lanes: Records, ends: Floats, law: Law, cruise: Cr
                 count += 1
                 cruise.memory[i]["unseen"] = cruise.memory[i]["blocked"]
                 cruise.memory[i]["blocked"] = 0
-    return inside[:count]
+    return count
 
 
 @njit_inner

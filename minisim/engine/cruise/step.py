@@ -35,7 +35,7 @@ def accelerate(vehicles: Records, lanes: Records, layout: Layout, law: Law, crui
     """
     overlap = False
     ends, mine = layout.ends, cruise.type
-    inside = gather(vehicles, lanes, ends, law, cruise)
+    inside = cruise.inside[: gather(vehicles, lanes, ends, law, cruise)]
     for lane in range(len(lanes)):
         is_open = lanes[lane]["open"] != 0
         first = lanes[lane]["first"]

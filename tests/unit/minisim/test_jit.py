@@ -90,6 +90,28 @@ def test_python_may_call_what_is_compiled_for_compiled_callers_only(tmp_path: Pa
     assert ask(tree, twice).split("\n") == ["10.5 compiled", "3.0 4.0 1"]
 
 
+RUN = """
+import minisim
+from numba.core.registry import cpu_target
+from numba.core.runtime import rtsys
+from scenarios import four_way
+from scenarios.controllers import controller_named
+
+rtsys.initialize(cpu_target.target_context)
+for profile in ("fair", "as_run"):
+    before = rtsys.get_allocation_stats()
+    scenario = four_way(350, profile=profile, horizon=30.0)
+    minisim.simulate(scenario, controller_named("dim", profile), on_collision="record")
+    after = rtsys.get_allocation_stats()
+    print(after.alloc - before.alloc - (after.free - before.free))
+"""
+
+
+def test_compiled_code_keeps_no_memory() -> None:
+    """It does not count references, so an array that it made would stay until the process ends."""
+    assert python("-c", RUN, NUMBA_NRT_STATS="1").stdout.split() == ["0", "0"]
+
+
 def test_looking_at_the_sources_is_quick() -> None:
     folder = Path(minisim.jit.__file__).parent
     times = []
