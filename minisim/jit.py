@@ -131,7 +131,7 @@ _INNER_PARTS = {
     "caching.IndexDataCacheFile": ("_data_name", "_load_index", "_save_data", "_save_index"),
     "cpu.CPUTargetOptions": ("_nrt", "forceinline", "no_cfunc_wrapper", "no_cpython_wrapper"),
     "registry.CPUDispatcher": ("compile",),
-    "runtime.rtsys": ("initialize",),
+    "runtime.nrt.rtsys": ("initialize",),
 }
 
 
@@ -142,7 +142,7 @@ def _known() -> bool:
 
     try:
         for name, parts in _INNER_PARTS.items():
-            module, _, owner = name.partition(".")
+            module, _, owner = name.rpartition(".")
             for part in parts:
                 getattr(getattr(import_module(f"numba.core.{module}"), owner), part)
     except (ImportError, AttributeError):
@@ -156,7 +156,7 @@ def _known() -> bool:
 def _cache_class() -> Any:
     import numba
     from numba.core.caching import FunctionCache, IndexDataCacheFile
-    from numba.core.runtime import rtsys
+    from numba.core.runtime.nrt import rtsys
 
     class Files(IndexDataCacheFile):
         """An index, and the code for each signature, which several processes may write at once.
@@ -194,7 +194,7 @@ def _cache_class() -> Any:
             """The code on disk; None if there is none, and it has to be compiled."""
             # numba's would first load what only its compiler needs, all of scipy.linalg included.
             rtsys.initialize(target_context)  # for code that makes arrays
-            with self._guard_against_spurious_io_errors():  # type: ignore[no-untyped-call]  # as above
+            with self._guard_against_spurious_io_errors():
                 found = self._load_overload(sig, target_context)  # type: ignore[no-untyped-call]
             if found is None:
                 _announce()

@@ -37,14 +37,16 @@ Plot = Annotated[Path | None, option("Draw it (.png, .pdf, .svg).", "FILE", call
 
 
 def junction(
-    name: str, bearings: str | None, *clearance: float, **more: Any
+    name: str, bearings: str | None, clearance: float | None = None, **more: Any
 ) -> tuple[Scenario, HarmonyMatrix]:
     """A scenario and the harmony matrix of its movements; `more` as in `build_scenario`."""
     from dim import HarmonyMatrix
+    from minisim.junction.conflicts import CLEARANCE
 
     scenario = build_scenario(name, bearings, **more)
-    vehicles = scenario.vehicles
-    return scenario, HarmonyMatrix.from_geometry(scenario.intersection, vehicles, *clearance)
+    room = CLEARANCE if clearance is None else clearance
+    matrix = HarmonyMatrix.from_geometry(scenario.intersection, scenario.vehicles, room)
+    return scenario, matrix
 
 
 def closed(scenario: Scenario) -> list[str]:
