@@ -211,7 +211,7 @@ import numba.core.caching
 del numba.core.caching.IndexDataCacheFile._save_data
 """
 
-RUN = """
+SHORT = """
 from minisim import simulate
 from dim import Dim
 from scenarios import four_way
@@ -232,6 +232,6 @@ def test_an_unknown_numba_is_told_and_compiles_without_its_inner_parts(tmp_path:
 
 @pytest.mark.slow  # compiles the whole engine
 def test_runs_are_the_same_with_an_unknown_numba() -> None:
-    other = python("-W", "ignore", "-c", OTHER_NUMBA + RUN)
+    other = python("-W", "ignore", "-c", OTHER_NUMBA + SHORT)
     assert other.stderr == ""
-    assert other.stdout == python("-c", RUN).stdout
+    assert other.stdout == python("-c", SHORT).stdout
