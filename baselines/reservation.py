@@ -40,6 +40,7 @@ from minisim.control import (
     Hold,
     Observed,
     Plan,
+    Radio,
     Site,
     View,
     Wake,
@@ -65,6 +66,7 @@ class Reservation:
 
     name = Name("reservation")
     covers = Cover(alike=True)
+    radio = Radio()
 
     # Asking earlier lets distant vehicles reserve room that nearer ones need: at 350 veh/h/lane
     # (fair) the mean time loss is 4.1 s at 30 m, 4.7 at 60, 5.3 at 100 and 10.2 at 150.

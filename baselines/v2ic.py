@@ -20,7 +20,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
-from minisim.control import Advise, Command, Go, Observed, Plan, Site, View, Wake
+from minisim.control import Advise, Command, Go, Observed, Plan, Radio, Site, View, Wake
 from minisim.names import Name
 from minisim.parameters import declared, real
 
@@ -33,6 +33,7 @@ class V2IC:
     """V2I-C, the controller of Li and Liu: a roadside unit with a serving list advises speeds."""
 
     name = Name("v2ic")
+    radio = Radio()
 
     # 200 m in the authors' code.
     reach: float = real(

@@ -28,7 +28,7 @@ from typing import NamedTuple
 import shapely
 
 from baselines.v2ic import CRAWL
-from minisim.control import NOTHING, Advise, Command, Plan, Site, View, Wake
+from minisim.control import NOTHING, Advise, Command, Plan, Radio, Site, View, Wake
 from minisim.errors import InputError
 from minisim.junction.geometry import Intersection
 from minisim.names import Name
@@ -58,6 +58,7 @@ class V2ICAsRun:
 
     name = Name("v2ic-as-run")
     covers = NOTHING
+    radio = Radio()
 
     approach_speed: float = real(
         "speed desired from insertion to the first advice: 16.6 in the balanced runs, 14 (the "

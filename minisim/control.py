@@ -421,12 +421,26 @@ def cover_of(controller: object) -> Cover:
     return covers
 
 
+@declared
+class Radio:
+    """How large the messages are that vehicles and a controller send each other.
+
+    A vehicle sends one for each view that shows it, a controller one for each command to a vehicle.
+    """
+
+    # The smaller and more frequent of the two messages by which 3GPP compares radio links between
+    # vehicles (TR 36.885, release 14, annex A.1.5, periodic traffic).
+    state: int = whole("where a vehicle is and how fast, in bytes", default=190, low=1)
+    command: int = whole("what it shall do, in bytes", default=190, low=1)
+
+
 @runtime_checkable
 class Controller(Protocol):
     """A recipe for sessions: hashable, picklable, never changed by a run.
 
     It promises that no `ORDINARY` vehicles collide and that each is served. A controller that
-    promises less or more has an attribute `covers`, a `Cover`.
+    promises less or more has an attribute `covers`, a `Cover`. One that vehicles talk to has an
+    attribute `radio`, a `Radio`; without it, nothing is sent.
     """
 
     @property

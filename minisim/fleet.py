@@ -70,7 +70,7 @@ _SUMO = (
 )  # fmt: skip
 
 #: SUMO's classes count as the types that they stand for.
-ALIKE = {
+_ALIKE = {
     "sumo-passenger": "car", "sumo-delivery": "lcv", "sumo-bus": "bus", "sumo-coach": "bus",
     "sumo-truck": "truck", "sumo-trailer": "truck",
 }  # fmt: skip
@@ -87,14 +87,20 @@ _REAR_AXLES = {
 OFFTRACKING = "-offtracking"
 
 
+def kind_of(name: str) -> str:
+    """What a ready type counts as, such as "bus" for "sumo-coach"; other names stay."""
+    plain = name.removesuffix(OFFTRACKING)
+    return _ALIKE.get(plain, plain)
+
+
 def _offtracking(it: VehicleType) -> VehicleType:
-    axle = _REAR_AXLES[ALIKE.get(it.name, it.name)] * it.length
+    axle = _REAR_AXLES[kind_of(it.name)] * it.length
     return replace(it, name=it.name + OFFTRACKING, rear_axle=round(axle, 2))
 
 
 _RIGID = tuple(
     it for it in (*_INDIAN, *_SUMO)
-    if ALIKE.get(it.name, it.name) in _REAR_AXLES and it.name != "sumo-trailer"
+    if kind_of(it.name) in _REAR_AXLES and it.name != "sumo-trailer"
 )  # fmt: skip
 
 #: The ready types by name.

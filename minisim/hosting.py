@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import math
 import sys
+import time
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from minisim.arrivals import Arrivals
 from minisim.control import (
@@ -36,6 +40,7 @@ from minisim.errors import (
     InputError,
     MinisimError,
     choice,
+    instance,
     integer,
     number,
     show,
@@ -103,7 +108,10 @@ class Hosted:
     arrivals: Arrivals
     session: Session
     plan: Plan
+    timed: bool = False  # whether the CPU time of each decision is kept
     before: dict[str, float] = field(default_factory=dict)  # counts at the end of the warm-up
+    exchange: Counter[str] = field(default_factory=Counter)  # see `Run.exchange`
+    times: list[int] = field(default_factory=list)  # of the decisions [ns]
 
     def ask(self, view: View, tick: int) -> list[Command]:
         """Show the session its view at `tick` and return its commands.
@@ -112,11 +120,20 @@ class Hosted:
         answer that cannot be carried out.
         """
         try:
+            began = time.thread_time_ns() if self.timed else 0
             commands = _listed(self.session.decide(view))
+            if self.timed:
+                self.times.append(time.thread_time_ns() - began)
+            self.exchange["decisions"] += 1
+            self.exchange["shown"] += len(view.vehicles)
             if 0.0 < view.time <= self.scenario.warmup and keeps(self.session, Counting):
                 self.before.update(self.session.counts)
             for command in commands:
                 _check_command(command, tick, self.site, len(self.arrivals))
+                self.exchange[type(command).__name__] += 1
+            if view.time < self.scenario.warmup:
+                self.exchange.clear()
+                self.times.clear()
         except (Exception, SystemExit) as error:  # a caller's code may raise anything
             raise _blame(self.controller, error, self.session, f" at {view.time:.1f} s") from error
         return commands
@@ -148,6 +165,8 @@ class Hosted:
             record_window=self.record_window,
             counts=counts,
             kinds=kinds,
+            exchange=dict(self.exchange),
+            decision_times=np.array(self.times) / 1e9 if self.timed else None,
             **measured,
         )
 
@@ -161,6 +180,7 @@ def begin(
     record_window: tuple[float, float],
     on_collision: str,
     reactions: Sequence[str] = ON_COLLISION,
+    timed: bool = False,
 ) -> Hosted:
     """Check the arguments, draw the arrivals and start the controller's session.
 
@@ -170,6 +190,7 @@ def begin(
     if record is not None:
         choice("record", record, RECORDS)
     choice("on_collision", on_collision, reactions)
+    instance("timed", timed, bool)
     window = checked_window(record_window)
     if isinstance(scenario, type) or not all(hasattr(scenario, name) for name in NEEDED):
         raise InputError(f"scenario must be a Scenario such as four_way(), got {show(scenario)}")
@@ -179,7 +200,7 @@ def begin(
     arrivals.check(site.intersection.n, site.intersection.allowed_by_lane)
     return Hosted(
         scenario, controller, int(seed), record, window, on_collision, site, arrivals,
-        *start(controller, site),
+        *start(controller, site), timed,
     )  # fmt: skip
 
 

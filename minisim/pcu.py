@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from minisim.errors import choice
-from minisim.fleet import ALIKE, OFFTRACKING, Fleet
+from minisim.fleet import Fleet, kind_of
 
 #: Units of an inflow that are passenger car units, and how many a vehicle of each type counts.
 #:
@@ -37,8 +37,7 @@ def pcu_factors(fleet: Fleet, unit: str, n: int) -> tuple[float, ...]:
     """
     table = UNITS[choice("passenger car unit", unit, UNITS)]
     shares = np.mean([fleet.of_lane(lane) for lane in range(n)], axis=0)
-    plain = [name.removesuffix(OFFTRACKING) for name in fleet.names]
-    kinds = [ALIKE.get(name, name) for name in plain]
+    kinds = map(kind_of, fleet.names)
     rows = [table[choice(f"vehicle type in {unit}", kind, table)] for kind in kinds]
     return tuple(
         float(np.interp(share, (0.05, 0.10), row)) for share, row in zip(shares, rows, strict=True)

@@ -60,6 +60,7 @@ class Simulation:
         on_collision: "stop" raises `CollisionError`; "record" notes each pair once and goes on.
             "teleport", for a `CruiseVehicle` only, also lets a vehicle closer than `min_gap` to
             the one ahead on its exit arrive, as SUMO did in the published runs.
+        timed: keep the CPU time of each decision (`Run.decision_times`).
 
     Raises:
         InputError: a value that is not allowed, or a scenario that the controller cannot serve.
@@ -74,10 +75,11 @@ class Simulation:
         record: str | None = None,
         record_window: tuple[float, float] = (0.0, math.inf),
         on_collision: str = "stop",
+        timed: bool = False,
     ) -> None:
         self._hosted = hosted = begin(
             scenario, controller, seed, record=record, record_window=record_window,
-            on_collision=on_collision, reactions=REACTIONS,
+            on_collision=on_collision, reactions=REACTIONS, timed=timed,
         )  # fmt: skip
         self.site, plan = hosted.site, hosted.plan
         teleports = on_collision == "teleport"
@@ -228,6 +230,7 @@ def simulate(
     record: str | None = None,
     record_window: tuple[float, float] = (0.0, math.inf),
     on_collision: str = "stop",
+    timed: bool = False,
 ) -> Run:
     """Run a scenario under a controller; see `Simulation` for the arguments and errors.
 
@@ -244,4 +247,5 @@ def simulate(
         record=record,
         record_window=record_window,
         on_collision=on_collision,
+        timed=timed,
     ).run()

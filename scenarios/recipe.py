@@ -15,7 +15,8 @@ from minisim.errors import InputError, show
 from minisim.hosting import REACTIONS
 from minisim.names import name_of
 from minisim.parameters import Spelled, Takes, checked, declared, part, real, text, whole, word
-from minisim.results.metrics import Asked, Metric, asked_metrics
+from minisim.results.metric import Metric
+from minisim.results.metrics import Asked, asked_metrics
 from minisim.results.run import Run
 from scenarios.controllers import controller_named
 from scenarios.loading import metrics_named
@@ -89,7 +90,12 @@ class Recipe:
         """
         from minisim.simulation import simulate
 
-        if any(metric.needs == "trajectories" for metric in asked_metrics(self.metrics)):
+        needs = {metric.needs for metric in asked_metrics(self.metrics)}
+        if "whole trajectories" in needs:
+            options["record"] = "all"
+        elif "trajectories" in needs:
             options["record"] = options.get("record") or "junction"
+        if "decisions" in needs:
+            options["timed"] = True
         options["on_collision"] = self.on_collision
         return (host or simulate)(self.scenario, self.driven, self.seed, **options)

@@ -30,6 +30,7 @@ from minisim.control import (
     Observed,
     Open,
     Plan,
+    Radio,
     Session,
     Site,
     Unregulated,
@@ -38,7 +39,7 @@ from minisim.control import (
 )
 from minisim.counts import Count, read_counts
 from minisim.engine import packed
-from minisim.engine.state import DRIVING, Layout, Records
+from minisim.engine.state import DRIVING, TRACE, Layout, Records
 from minisim.errors import FileError
 from minisim.junction.movements import ARM_NAMES
 from minisim.laws import Law
@@ -76,6 +77,13 @@ def queues(vehicle: VehicleType, limit: float = 14.0) -> Scenario:
     road = dataclasses.replace(scenario.intersection, arm_length=100.0 + 8 * vehicle.length)
     trips = [(0.0, lane, 2) for lane, count in enumerate((8, 8, 2, 2)) for _ in range(count)]
     return replayed(dataclasses.replace(scenario, intersection=road), *trips, horizon=600.0)
+
+
+def driven(run: Run, *lines: tuple[int, int, float, float, float]) -> Run:
+    """The run as if this had been recorded: (vehicle, tick, s [m], v [m/s], a [m/s²]) each."""
+    row = {vehicle: k for k, vehicle in enumerate(run.rows["id"].tolist())}
+    trace = [(tick, row[vehicle], s, v, a, 1) for vehicle, tick, s, v, a in lines]
+    return dataclasses.replace(run, record="all", trace=np.array(trace, TRACE))
 
 
 class Greens:
@@ -147,6 +155,7 @@ class Scripted:
     answer: Callable[[View], Iterable[Command]]
     plan: Plan = field(default_factory=Plan)
     name: str = "scripted"
+    radio: Radio | None = None
 
     def start(self, site: Site) -> Session:
         return ScriptedSession(self.plan, self.answer)

@@ -1,10 +1,10 @@
 """The table of metrics: what is measured in a run, in which unit and by which equation.
 
-A metric has one value per trip or one number per run. Trip values are averaged over the whole run
-and over each group of trips, in two forms. SUMO's form, which the paper used, is the mean over the
-trips that ended before the horizon. The complete form is the mean over all demanded trips: an
-unfinished one counts with its waiting, loss and travel up to the horizon, and a vehicle that never
-got onto the road counts with its departure delay.
+A metric has one value per trip, a series per lane or one number per run. Trip values are averaged
+over the whole run and over each group of trips, in two forms. SUMO's form, which the paper used, is
+the mean over the trips that ended before the horizon. The complete form is the mean over all
+demanded trips: an unfinished one counts with its waiting, loss and travel up to the horizon, and a
+vehicle that never got onto the road counts with its departure delay.
 
 Nothing before the end of the warm-up is measured: trips that were demanded, trajectories and
 counts. Only collisions always count, so that no run hides one.
@@ -21,132 +21,50 @@ from __future__ import annotations
 
 import inspect
 import math
-import traceback
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from numbers import Integral, Real
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from minisim.errors import InputError, MinisimError, choice, items, show
-from minisim.parameters import Switch, checked, declared, parameters, switch, text, word
+from minisim.errors import InputError, choice, items
+from minisim.parameters import parameters
+from minisim.results import driving, exchange, fairness, queues
+from minisim.results.metric import Metric
 from minisim.results.trips import Floats, Trips, queue_growth
 
 if TYPE_CHECKING:
     from minisim.results.run import Run
 
-#: Names that no metric may have: keys of summaries and columns of sweeps.
-RESERVED: Final = frozenset({
-    "arms", "arrivals", "complete", "controller", "cpu_s", "density", "difference", "error",
-    "failed", "growing", "horizon_s", "host", "kind", "kinds", "lane", "lanes", "manoeuvre",
-    "movements", "pairs", "profile", "recipe", "runs", "scenario", "seed", "side", "spillback_s",
-    "split", "too_short", "turns", "vehicle", "version", "warmup_s",
-})  # fmt: skip
-
-#: What trips can be grouped by -> the groups' key in a summary.
-GROUPS: Final = {"lane": "lanes", "movement": "movements", "kind": "kinds", "type": "types"}
-
-#: Suffixes of the columns with percentiles (numpy's linear method) and the maximum.
-SPREAD: Final = ("p50", "p95", "max")
-
-#: Prefixes and suffixes of columns made from metrics.
-BEGINNINGS: Final = ("complete_", *(f"{key}_" for key in GROUPS.values()))
-ENDINGS: Final = tuple(f"_{what}" for what in (*SPREAD, "ci95", "pi95"))
-
-
-def _name(title: str, value: Any) -> Any:
-    if not isinstance(value, str) or not value.isidentifier():
-        raise InputError(f"{title} must be letters, digits and underscores, got {show(value)}")
-    if value in RESERVED or value.startswith(BEGINNINGS) or value.endswith(ENDINGS):
-        raise InputError(f"{title} must not be a column of runs, got {value!r}")
-    return value
-
-
-def _function(title: str, value: Any) -> Any:
-    if not callable(value):
-        raise InputError(f"{title} must be a function, got {show(value)}")
-    return value
-
-
-@declared
-class Metric:
-    """One metric: its column, its meaning and the function that measures it.
-
-    The function takes the `Trips` if `needs` is "trips", otherwise the `Run`, both without the
-    warm-up (`Run.counted`). A number that needs only trips also has a value per group of trips.
-    """
-
-    name: str = checked("the column", _name, "identifier", label="name of a metric")
-    of: Callable[[Any], Any] = checked(
-        "measures it: returns an array with one value per trip (NaN for none), or one number "
-        "(None for none)",
-        _function, "function", label="function of a metric",
-    )  # fmt: skip
-    unit: str = text("such as s", empty=True, default="")
-    per: str = word("what has a value", ("trip", "run"), default="run")
-    needs: str = word("measured from", ("trips", "run", "trajectories", "counts"), default="run")
-    phase: str = word(
-        "of a trip, in which a value accumulates: on the road, or before insertion",
-        ("drive", "queue"), default="drive",
-    )  # fmt: skip
-    title: str = text("for headings and axes; empty means its name", empty=True, default="")
-    symbol: str = text("in equations", empty=True, default="")
-    meaning: str = text("in one line", empty=True, default="")
-    equation: str = text("with its source", empty=True, default="")
-    usual: Switch = switch("whether every summary has it", default=False)
-
-    @property
-    def grouped(self) -> bool:
-        """Whether each lane, movement and kind has a value of its own."""
-        return self.per == "trip" or self.needs == "trips"
-
-    @property
-    def heading(self) -> str:
-        """Title and unit, such as "waiting [s]"."""
-        return f"{self.title or self.name} [{self.unit}]".removesuffix(" []")
-
-    def values(self, subject: Run | Trips, count: int) -> Floats:
-        """One value per trip, shape (count,), NaN for none; otherwise `InputError`."""
-        given = self._measured(subject)
-        values = np.asarray(given)
-        if values.shape != (count,) or values.dtype.kind not in "biuf" or np.isinf(values).any():
-            raise InputError(
-                f"metric {self.name!r} must give one finite number per trip, an array of shape "
-                f"({count},), got {show(given)}"
-            )
-        return np.asarray(values, dtype=float)
-
-    def number(self, subject: Run | Trips) -> float | int | None:
-        """One number, or None if there is none; raises `InputError` for anything else."""
-        given = self._measured(subject)
-        if given is None:
-            return None
-        if not isinstance(given, Real | np.bool_) or math.isinf(given):
-            hint = '; per="trip" takes an array' if isinstance(given, np.ndarray) else ""
-            raise InputError(
-                f"metric {self.name!r} must give one finite number or None, got {show(given)}{hint}"
-            )
-        if isinstance(given, Integral | np.bool_):
-            return int(given)
-        return None if math.isnan(given) else float(given)
-
-    def _measured(self, subject: Run | Trips) -> Any:
-        try:
-            return self.of(subject)
-        except (Exception, SystemExit) as error:  # a caller's function may raise anything
-            frames = traceback.extract_tb(error.__traceback__)[1:2]
-            place = "".join(f" ({Path(it.filename).name}, line {it.lineno})" for it in frames)
-            what = f" raised {type(error).__name__}: {error}{place}"
-            if isinstance(error, MinisimError):
-                what = f": {error}"
-            raise InputError(f"metric {self.name!r}{what}") from error
-
 
 def _growth(trips: Trips) -> float:
     leave = np.where(trips.arrived, trips.arrival, math.inf)
     return queue_growth(trips.demand_time, leave, trips.end, trips.start)
+
+
+def _throughput(trips: Trips) -> float | None:
+    left = np.sort(trips.arrival[trips.arrived])
+    if len(left) < 2 or trips.end <= left[0]:
+        return None
+    return float(3600.0 * (len(left) - 1) / (trips.end - left[0]))
+
+
+def _grade(run: Run) -> int | None:
+    from minisim.results.service import grade
+
+    return grade(run)
+
+
+def _close(name: str) -> Callable[[Run], Floats]:
+    """The share of `minisim.results.safety` with this name, by trip."""
+
+    def of(run: Run) -> Floats:
+        from minisim.results import safety
+
+        shares: Floats = getattr(safety, name)(run)
+        return shares
+
+    return of
 
 
 def _tally(name: str) -> Callable[[Run], float | None]:
@@ -159,6 +77,8 @@ def _safety(name: str) -> Callable[[Run], float | None]:
 
 _TRIPINFO = "(SUMO, Simulation/Output/TripInfo)"
 _SSM = "(SUMO, Simulation/Output/SSM Device)"
+_HORST = "(van der Horst 1990)"
+_HBEFA = "Σ rate(v, a) dt, HBEFA 3.1 in SUMO (Krajzewicz et al. 2015; minisim.results.emissions)"
 
 #: Metric that counts short encroachments -> the time that they are shorter than [s].
 PETS: Final = {"pets_below_1_s": 1.0, "pets_below_1_5_s": 1.5, "pets_below_2_s": 2.0}
@@ -201,6 +121,35 @@ TABLE: Final = (
         equation="time loss + departure delay; by it HCM 2016 grades the level of service",
     ),
     Metric(
+        "level_of_service", _grade, needs="run and trips", title="level of service", symbol="LOS",
+        meaning="grade of the mean control delay, with unfinished trips: 1 for A to 6 for F",
+        grades="ABCDEF",
+        equation="signals: HCM 2016, exhibit 19-8; all others: exhibits 20-2 and 21-8",
+    ),
+    Metric(
+        "throughput_vph", _throughput, "veh/h", needs="trips", title="throughput", symbol="q",
+        meaning="vehicles that left after the first one, per hour from then to the end",
+        equation="(k − 1)/(end − first arrival)",
+    ),
+    Metric(
+        "saturation_headway_s", queues.saturation_headways, "s", "trip", "whole trajectories",
+        title="saturation headway", symbol="h",
+        meaning="between vehicles that leave a standing queue, from the fifth on",
+        equation="entry into the junction − entry of the one ahead (HCM 2016, chapter 31)",
+    ),
+    Metric(
+        "stops", driving.stops, "", "trip", "whole trajectories", title="stops",
+        meaning="times that a vehicle came to a standstill",
+        equation=f"v ≤ 0.1 m/s begins: waitingCount {_TRIPINFO}",
+    ),
+    Metric(
+        "queue", queues.queue_lengths, "veh", "lane", "whole trajectories", title="queue",
+        meaning="vehicles queued on the approach or before the road, over time; the whole run: in "
+        "all lanes together",
+        equation="v < 5 km/h for 1 s (SUMO, Simulation/Output/Lanearea Detectors), or waiting to "
+        "enter",
+    ),
+    Metric(
         "collisions", lambda run: len(run.collisions), title="collisions",
         meaning="pairs of vehicles that touched", usual=True,
     ),
@@ -208,6 +157,62 @@ TABLE: Final = (
         "queue_growth", _growth, needs="trips", title="queue growth", symbol="ΔN",
         meaning="more vehicles in the last quarter than in the second",
         equation="N̄(4th quarter) − N̄(2nd quarter), N from demand to arrival (ours)",
+    ),
+    Metric(
+        "worst_lane_s", fairness.worst_lane, "s", needs="trips", title="worst lane",
+        meaning="longest mean waiting of a lane, with unfinished trips",
+    ),
+    Metric(
+        "lane_gini", fairness.lane_gini, needs="trips", title="inequality of lanes", symbol="G",
+        meaning="0 if the mean waiting is the same in all lanes",
+        equation="Σᵢⱼ kᵢkⱼ|wᵢ − wⱼ|/(2 Σkᵢ Σkᵢwᵢ), k trips of a lane (Gini 1912)",
+    ),
+    Metric(
+        "order_reversals", fairness.order_reversals, "", "trip", "trajectories",
+        title="order reversals",
+        meaning="vehicles on conflicting ways that came later than this one and went first",
+        equation="slips (Larson 1987); comes: demand + way to the junction/limit, goes: enters it",
+    ),
+    Metric(
+        "fuel_g", driving.fuel, "g", "trip", "whole trajectories", title="fuel",
+        meaning="of cars, vans, buses and trucks; none for other types", equation=_HBEFA,
+    ),
+    Metric(
+        "co2_g", driving.co2, "g", "trip", "whole trajectories", title="CO₂",
+        meaning="carbon dioxide, likewise", equation=_HBEFA,
+    ),
+    Metric(
+        "jerk_mps3", driving.jerk, "m/s³", "trip", "whole trajectories", title="jerk", symbol="j",
+        meaning="largest change of a vehicle's acceleration in a second",
+        equation="max |a(t) − a(t − 1 s)|/1 s, averaged as in ISO 15622:2018",
+    ),
+    Metric(
+        "hard_brakings", driving.hard_brakings, "", "trip", "whole trajectories",
+        title="hard brakings", meaning="times that a vehicle braked harder than is comfortable",
+        equation="a < −3.4 m/s² begins (AASHTO 2018, section 3.2.2)",
+    ),
+    Metric(
+        "decisions", lambda run: run.exchange.get("decisions"), title="decisions",
+        meaning="times that the controller was asked",
+    ),
+    *(
+        Metric(
+            name, exchange.decision_time(percentile), "µs", needs="decisions", title=title,
+            meaning=f"CPU time of a decision, {title.split()[0]}; differs from run to run",
+        )
+        for name, percentile, title in (
+            ("median_decision_us", 50.0, "median decision"),
+            ("p99_decision_us", 99.0, "p99 decision"),
+        )
+    ),
+    Metric(
+        "messages", exchange.messages, title="messages",
+        meaning="between vehicles and controller; DIM and signals send none",
+        equation="vehicles in all views + commands to vehicles (minisim.control.Radio)",
+    ),
+    Metric(
+        "message_bytes", exchange.message_bytes, "B", title="messages",
+        meaning="the same in bytes", equation="190 each (3GPP TR 36.885), or as declared",
     ),
     Metric(
         "min_ttc_s", _safety("min_ttc_s"), "s", needs="trajectories", title="minimum TTC",
@@ -242,6 +247,20 @@ TABLE: Final = (
     ),
     *(
         Metric(
+            name, _close(name), "", "trip", "trajectories", title=title, meaning=meaning,
+            equation=equation,
+        )
+        for name, title, meaning, equation in (
+            ("short_ttc", "TTC < 1.5 s", "share of vehicles that were so near to a collision",
+             f"as the follower or the second to cross, {_HORST}"),
+            ("short_pet", "PET < 1 s", "share of vehicles that entered an area so soon after "
+             "another", f"as the second {_HORST}"),
+            ("high_drac", "DRAC > 3.4 m/s²", "share of vehicles that had to brake so hard",
+             "as the follower (AASHTO 2018, section 3.2.2; Archer 2005 has 3.35)"),
+        )
+    ),
+    *(
+        Metric(
             name, _tally(name), "s" * name.endswith("_s"), needs="counts", meaning=meaning,
             title=name.removesuffix("_s").replace("_", " "),
         )
@@ -262,8 +281,10 @@ USUAL: Final = tuple(metric for metric in TABLE if metric.usual)
 #: Names of the usual metrics with one value per trip: columns of trip tables, and means.
 MEANS: Final = tuple(metric.name for metric in USUAL if metric.per == "trip")
 
-#: Names of the metrics of `minisim.results.safety`.
-SAFETY: Final = tuple(metric.name for metric in TABLE if metric.needs == "trajectories")
+#: Names of the metrics of `minisim.results.safety`, which `minisim run` always shows.
+SAFETY: Final = (
+    "min_ttc_s", "min_pet_s", "max_drac_mps2", "max_braking_mps2", "pets", *PETS,
+)  # fmt: skip
 
 #: What stands for a metric: its name, a `Metric`, or a function (`metric_of`).
 Asked = str | Metric | Callable[[Any], Any]

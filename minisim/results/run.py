@@ -21,13 +21,16 @@ from minisim.junction.movements import ARM_NAMES
 from minisim.names import name_of
 from minisim.results.metrics import Asked
 from minisim.results.summary import summarise, trip_table
+from minisim.results.tracks import Tracks, tracks_of
 from minisim.results.trajectories import TRAJECTORY_COLUMNS, TYPE
-from minisim.results.trips import Trips
+from minisim.results.trips import Floats, Trips
 from minisim.ticks import first_tick
 from minisim.version import __version__
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from minisim.results.safety import Encounters
 
 
 class ScenarioLike(Protocol):
@@ -87,6 +90,11 @@ class Run:
     rows: Records  #: vehicle id, path and type of each row to which the trace refers
     #: What the controller's session has counted since the warm-up.
     counts: Mapping[str, float] = field(default_factory=dict)
+    #: How often the controller decided since the warm-up (`decisions`), how many vehicles it was
+    #: `shown` then in all, and its commands by class, such as `Go`.
+    exchange: Mapping[str, int] = field(default_factory=dict)
+    #: CPU time of each of these decisions [s], shape (decisions,); None unless `timed`. Not saved.
+    decision_times: Floats | None = None
     #: First and last time of the recording [s]; the run may have ended earlier.
     record_window: tuple[float, float] = (0.0, math.inf)
     kinds: tuple[str, ...] = ()  #: kind of each vehicle by id; empty if all are of one kind
@@ -114,11 +122,23 @@ class Run:
         )
 
     @cached_property
+    def tracks(self) -> Tracks:
+        """The recording of its trips, sorted by vehicle; `InputError` if there is none."""
+        return tracks_of(self)
+
+    @cached_property
     def safety(self) -> Mapping[str, float | int | None]:
         """The closest calls in and near the junction; see `minisim.results.safety`."""
-        from minisim.results.safety import safety_of
+        from minisim.results.safety import summary_of
 
-        return safety_of(self.counted)
+        return summary_of(self.counted.encounters)
+
+    @cached_property
+    def encounters(self) -> Encounters:
+        """Each encounter of two vehicles in and near the junction; `InputError` if not recorded."""
+        from minisim.results.safety import encounters_of
+
+        return encounters_of(self)
 
     def summary(
         self, metrics: str | Iterable[Asked] = (), by: Iterable[str] = ()

@@ -48,6 +48,11 @@ if TYPE_CHECKING:
 #: The columns of a table.
 Columns = dict[str, npt.NDArray[Any]]
 
+#: An encounter is critical below these [s] (van der Horst 1990, A time-based analysis of road user
+#: behaviour in normal and critical encounters), or above this [m/s²] (what is comfortable, as in
+#: `minisim.results.driving`; Archer 2005, Indicators for traffic safety assessment, has 3.35).
+SHORT_TTC, SHORT_PET, HIGH_DRAC = 1.5, 1.0, 3.4
+
 #: Longer than any path [m]: keeps vehicles apart in one ascending array.
 _FAR = 1e6
 
@@ -67,6 +72,15 @@ class Rows(NamedTuple):
     goes: Bools
 
 
+class Encounters(NamedTuple):
+    """The columns of `following`, `encroachments` and `crossings`, and all accelerations [m/s²]."""
+
+    follow: Columns
+    encroach: Columns
+    cross: Columns
+    a: Floats
+
+
 def safety_summary(frame: pd.DataFrame, site: Site) -> dict[str, float | int | None]:
     """The closest calls in a recording; None if nothing of the kind happened.
 
@@ -74,11 +88,11 @@ def safety_summary(frame: pd.DataFrame, site: Site) -> dict[str, float | int | N
     encroachments, others the short ones (`minisim.results.metrics.PETS`). Raises `InputError` for
     a missing column, or a movement that the site does not have.
     """
-    return _summary(_rows(frame, site), site)
+    return summary_of(_encounters(_rows(frame, site), site))
 
 
-def safety_of(run: Run) -> dict[str, float | int | None]:
-    """`safety_summary` of what `record="junction"` keeps; raises `InputError` without a recording.
+def encounters_of(run: Run) -> Encounters:
+    """Those in what `record="junction"` keeps; raises `InputError` without a recording.
 
     It makes no frame, since pandas takes longer to load than a run to be measured.
     """
@@ -93,21 +107,52 @@ def safety_of(run: Run) -> dict[str, float | int | None]:
         run.site, np.round(trace["tick"] * run.site.dt, 6), rows["id"], rows["path"], rows["type"],
         trace["s"], trace["v"], trace["a"], trace["released"] != 0,
     )  # fmt: skip
-    return _summary(recording, run.site)
+    return _encounters(recording, run.site)
 
 
-def _summary(rows: Rows, site: Site) -> dict[str, float | int | None]:
-    follow = _following(rows, site)
-    pets = _encroachments(rows, site)["pet_s"]
-    ttc = np.concatenate([follow["ttc_s"], _crossings(rows, site)["ttc_s"]])
+def _encounters(rows: Rows, site: Site) -> Encounters:
+    tables = _following(rows, site), _encroachments(rows, site), _crossings(rows, site)
+    return Encounters(*tables, rows.a)
+
+
+def summary_of(found: Encounters) -> dict[str, float | int | None]:
+    """The closest calls among encounters, see `safety_summary`."""
+    follow, pets = found.follow, found.encroach["pet_s"]
+    ttc = np.concatenate([follow["ttc_s"], found.cross["ttc_s"]])
     return {
         "min_ttc_s": _extreme(np.min, ttc),
         "min_pet_s": _extreme(np.min, pets),
         "max_drac_mps2": _extreme(np.max, follow["drac_mps2"]),
-        "max_braking_mps2": _extreme(np.max, np.maximum(-rows.a, 0.0)),
+        "max_braking_mps2": _extreme(np.max, np.maximum(-found.a, 0.0)),
         "pets": len(pets),
         **{name: int((pets < limit).sum()) for name, limit in PETS.items()},
     }
+
+
+def short_ttc(run: Run) -> Floats:
+    """1 for each vehicle with a TTC below `SHORT_TTC` as follower or second, else 0, shape (k,)."""
+    follow, cross = run.encounters.follow, run.encounters.cross
+    late = (
+        follow["follower"][follow["ttc_s"] < SHORT_TTC],
+        cross["second"][cross["ttc_s"] < SHORT_TTC],
+    )
+    return _flags(run, np.concatenate(late))
+
+
+def short_pet(run: Run) -> Floats:
+    """1 for each vehicle with a PET below `SHORT_PET` as the second, else 0, shape (k,)."""
+    pets = run.encounters.encroach
+    return _flags(run, pets["second"][pets["pet_s"] < SHORT_PET])
+
+
+def high_drac(run: Run) -> Floats:
+    """1 for each vehicle with a DRAC above `HIGH_DRAC`, else 0, shape (k,)."""
+    follow = run.encounters.follow
+    return _flags(run, follow["follower"][follow["drac_mps2"] > HIGH_DRAC])
+
+
+def _flags(run: Run, vehicles: npt.ArrayLike) -> Floats:
+    return np.isin(run.columns.vehicle, vehicles).astype(float)
 
 
 def following(frame: pd.DataFrame, site: Site) -> pd.DataFrame:

@@ -31,15 +31,15 @@ from minisim.results.trips import TRIP_ARRAYS, Trips
 
 #: The type of file, and the layout that this version writes.
 MARK: Final = "minisim run"
-LAYOUT: Final = 2
+LAYOUT: Final = 3
 
 #: Packages whose classes are written as class and fields.
 PACKAGES: Final = ("minisim", "dim", "baselines", "scenarios")
 
 #: The fields of a run that hold plain values.
 _VALUES: Final = (
-    "seed", "site", "plan", "collisions", "record", "record_window", "counts", "host",
-    "environment",
+    "seed", "site", "plan", "collisions", "record", "record_window", "counts", "exchange",
+    "host", "environment",
 )  # fmt: skip
 
 

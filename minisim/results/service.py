@@ -1,4 +1,4 @@
-"""Level of service over a day: control delay by the interval in which vehicles came."""
+"""Level of service: of a run, and over a day by the interval in which vehicles came."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 #: Longest mean control delay of the levels A … E [s]; beyond is F. Highway Capacity Manual, 6th
 #: ed. (2016): exhibit 19-8 for signalised junctions; 20-2 and 21-8 for two-way and all-way stops.
+#: The manual also gives an F to demand over capacity; a run has no capacity, and its delay grows.
 LEVELS: Final = {
     "signalised": (10.0, 20.0, 35.0, 55.0, 80.0),
     "unsignalised": (10.0, 15.0, 25.0, 35.0, 50.0),
@@ -29,13 +30,30 @@ def level_of_service(delay: float, kind: str = "unsignalised") -> str:
     return "" if math.isnan(delay) else "ABCDEF"[int(np.searchsorted(limits, delay))]
 
 
-def service(run: Run, interval: float = 900.0, kind: str = "unsignalised") -> pd.DataFrame:
+def kind_of_junction(run: Run) -> str:
+    """ "signalised" if the controller opened lanes, as signals do; else "unsignalised"."""
+    return "signalised" if run.exchange.get("Open") else "unsignalised"
+
+
+def grade(run: Run) -> int | None:
+    """Level of service of all trips of a run, unfinished ones too: 1 for A … 6 for F, or None."""
+    trips = run.columns
+    if not len(trips.lane):
+        return None
+    delay = float(METRICS["control_delay_s"].values(trips, len(trips.lane)).mean())
+    return 1 + METRICS["level_of_service"].grades.index(
+        level_of_service(delay, kind_of_junction(run))
+    )
+
+
+def service(run: Run, interval: float = 900.0, kind: str = "") -> pd.DataFrame:
     """Waiting and delay of the vehicles that came in each interval of a run, after its warm-up.
 
     Args:
         run: whose trips are counted.
         interval: length of an interval [s].
-        kind: of the junction, for the level of service: "signalised" or "unsignalised".
+        kind: of the junction, for the level of service: "signalised" or "unsignalised"; by default
+            what it is (`kind_of_junction`).
 
     Returns:
         A row per interval: `start_s` in the run; `time`, the time of day if the demand has one;
@@ -66,5 +84,5 @@ def service(run: Run, interval: float = 900.0, kind: str = "unsignalised") -> pd
         "start_s": edges, "time": [time_of_day(midnight + edge) for edge in edges],
         "trips": came.astype(int), "served": total(trips.arrived).astype(int),
         "waiting_time_s": waiting, "control_delay_s": mean,
-        "los": [level_of_service(one, kind) for one in mean],
+        "los": [level_of_service(one, kind or kind_of_junction(run)) for one in mean],
     })  # fmt: skip

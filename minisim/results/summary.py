@@ -4,22 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from minisim.errors import InputError, choice, items
 from minisim.junction.movements import ARM_NAMES
-from minisim.results.metrics import (
-    GROUPS,
-    MEANS,
-    METRICS,
-    SPREAD,
-    USUAL,
-    Asked,
-    Metric,
-    asked_metrics,
-)  # fmt: skip
+from minisim.results.metric import GROUPS, SPREAD, Metric
+from minisim.results.metrics import MEANS, METRICS, USUAL, Asked, asked_metrics
 from minisim.results.spillback import spillback
 from minisim.results.trips import Ints, Trips
 
@@ -68,15 +61,15 @@ def summarise(
     Args:
         run: what to measure, without the warm-up of its scenario (`Run.counted`).
         metrics: names of `minisim.results.metrics.METRICS`, `Metric`s or functions
-            (`minisim.results.metrics.metric_of`). Each mean asked for also gets its median, 95th
-            percentile and maximum (`SPREAD`, numpy's linear method).
+            (`minisim.results.metrics.metric_of`). Each mean asked for, of trips or over time, also
+            gets its median, 95th percentile and maximum (`SPREAD`, numpy's linear method).
         by: further groupings, such as "movement".
 
     Raises `InputError` for an unknown metric or group, a metric that needs trajectories that were
     not recorded, a metric whose function raises or returns the wrong type or shape, or a
     controller's count that has the name of another number.
     """
-    full = spillback(run.columns, run.site, float(run.scenario.warmup))
+    whole, full = run, spillback(run.columns, run.site, float(run.scenario.warmup))
     run = run.counted
     asked = asked_metrics(metrics)
     keys = [GROUPS[choice("group of trips", one, GROUPS)] for one in items("by", by, "words")]
@@ -90,7 +83,14 @@ def summarise(
     for lane, name in enumerate(summary["lanes"]):
         summary["lanes"][name]["spillback_s"] = full.get(lane)
     summary |= {"complete": complete, "spillback_s": min(full.values(), default=None)}
-    summary |= {m.name: m.number(run) for m in table if m.per == "run" and m.needs != "trips"}
+    summary |= {m.name: m.number(run) for m in table if not m.grouped}
+    for metric in table:
+        if metric.per == "lane":
+            series = metric.series(whole)
+            for part, values in zip(
+                (summary, *summary["lanes"].values()), (series.sum(axis=1), *series.T), strict=True
+            ):
+                part |= {metric.name: _mean(values.tolist()), **_spread(metric.name, values)}
     for name in summary.keys() & run.counts.keys():
         if name not in METRICS or METRICS[name].needs != "counts":
             raise InputError(f"the controller's count {name!r} has the name of another number")
@@ -101,7 +101,7 @@ class _Measured:
     """The metrics of a run, measured once and then summarised for any set of its trips."""
 
     def __init__(self, run: Run, table: tuple[Metric, ...], asked: tuple[Metric, ...]) -> None:
-        self._trips = run.columns
+        self._run, self._trips = run, run.columns
         self._spread = {metric.name for metric in asked}
         self._values = [
             (m, m.values(run.columns if m.needs == "trips" else run, len(run.columns.lane)))
@@ -109,7 +109,7 @@ class _Measured:
             if m.per == "trip"
         ]
         # The two numbers that every group has are computed in `of`.
-        self._numbers = [m for m in table if m.per == "run" and m.needs == "trips" and not m.usual]
+        self._numbers = [m for m in table if m.per == "run" and m.grouped and not m.usual]
 
     def of(self, rows: Ints) -> dict[str, Any]:
         """Numbers and means of the trips at these indices."""
@@ -118,7 +118,9 @@ class _Measured:
         numbers: dict[str, Any] = {"trips": len(rows), "unfinished": len(rows) - len(arrived)}
         if self._numbers:
             part = trips.taken(rows)
-            numbers |= {metric.name: metric.number(part) for metric in self._numbers}
+            run = replace(self._run, columns=part)
+            for metric in self._numbers:
+                numbers[metric.name] = metric.number(part if metric.needs == "trips" else run)
         complete: dict[str, float | None] = {}
         for metric, values in self._values:
             begun = departed if metric.phase == "drive" else rows
@@ -138,7 +140,7 @@ def _mean(values: list[float]) -> float | None:
     return total / len(values) if values else None
 
 
-def _spread(name: str, values: list[float]) -> dict[str, float | None]:
+def _spread(name: str, values: Iterable[float]) -> dict[str, float | None]:
     """Median, 95th percentile and maximum, ignoring NaNs, as columns."""
     there = [value for value in values if value == value]
     spread = np.percentile(there, (50, 95, 100)).tolist() if there else [None] * 3

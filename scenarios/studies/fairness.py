@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable
-from itertools import product
 from typing import TYPE_CHECKING
 
-from minisim.errors import InputError, numbers
 from minisim.junction.movements import ARM_NAMES
+from minisim.results.fairness import gini
 from scenarios.paper import DENSITIES
 from scenarios.studies.shared.points import fair_grid
 from scenarios.studies.shared.study import Study
@@ -25,25 +22,6 @@ STUDY = Study(
 
 #: Column of a lane's mean waiting, in the complete form, or a starved lane would look served.
 LANE_WAIT = "lanes_{}_complete_waiting_time_s"
-
-
-def gini(values: Iterable[float], weights: Iterable[float] | None = None) -> float:
-    """Gini's coefficient Σᵢⱼ wᵢwⱼ|xᵢ − xⱼ| / (2 Σwᵢ Σwᵢxᵢ) (Gini 1912, mean difference form).
-
-    It is 0 if all values are equal, and 1 − 1/n if one of n has everything. Weights have a sum > 0
-    and are equal by default. `InputError` for no value, a negative one, or weights that do not fit.
-    """
-    xs = numbers("values", values)
-    ws = (1.0,) * len(xs) if weights is None else numbers("weights", weights)
-    if not xs or len(ws) != len(xs) or min(*xs, *ws) < 0.0 or not math.fsum(ws):
-        raise InputError(f"Gini needs values ≥ 0 with a weight ≥ 0 each, got {xs} and {ws}")
-    weighted = [*zip(ws, xs, strict=True)]
-    total = math.fsum(w * x for w, x in weighted)
-    if total == 0.0:
-        return 0.0
-    pairs = product(weighted, repeat=2)
-    difference = math.fsum(wi * wj * abs(xi - xj) for (wi, xi), (wj, xj) in pairs)
-    return difference / (2.0 * math.fsum(ws) * total)
 
 
 def lane_waits(rows: pd.DataFrame, arms: int) -> pd.DataFrame:

@@ -11,7 +11,7 @@ from numbers import Real
 from typing import TYPE_CHECKING, Any, Final
 
 from minisim.errors import InputError, choice
-from minisim.results.metrics import BEGINNINGS, Metric
+from minisim.results.metric import BEGINNINGS, Metric
 from scenarios.statistics import FILLING, mean_interval, prediction_interval
 from scenarios.sweep.rows import grows
 

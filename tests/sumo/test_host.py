@@ -39,6 +39,7 @@ from minisim.control import (
 )
 from minisim.errors import CollisionError, ControllerError, FileError, InputError, SumoError
 from minisim.junction.geometry import Intersection
+from minisim.results.driving import stops
 from minisim.results.run import Run
 from minisim.sumo import host, network, simulate
 from minisim.testing import check_controller, small_scenario
@@ -256,6 +257,14 @@ def test_trips_are_sumos(busy: tuple[Run, Run, Path]) -> None:
             assert measured.tolist() == pytest.approx(said)
     assert undeparted > 0
     assert run.summary()["unfinished"] > undeparted
+
+
+def test_stops_are_sumos(busy: tuple[Run, Run, Path]) -> None:
+    _, run, folder = busy
+    written = ET.parse(folder / "tripinfo.xml").getroot().iter("tripinfo")
+    counts = {int(trip.attrib["id"]): int(trip.attrib["waitingCount"]) for trip in written}
+    assert stops(run).tolist() == [counts[vehicle] for vehicle in run.columns.vehicle.tolist()]
+    assert max(counts.values()) > 2
 
 
 def test_waiting_is_time_at_a_tenth_of_a_metre_a_second_or_less() -> None:

@@ -12,7 +12,8 @@ from rich.text import Text
 from minisim.clock import time_of_day
 from minisim.errors import plural
 from minisim.junction.movements import ARM_NAMES
-from minisim.results.metrics import GROUPS, METRICS, SPREAD, Metric, asked_metrics, heading
+from minisim.results.metric import GROUPS, SPREAD, Metric
+from minisim.results.metrics import METRICS, asked_metrics, heading
 from minisim.results.show import conditions, spilled
 from scenarios.statistics import FILLING, Interval
 from scenarios.sweep.cells import SUMS
@@ -95,7 +96,7 @@ def _columns(metrics: Iterable[Metric], usual: Iterable[str]) -> dict[str, str]:
     for metric in metrics:
         if metric.grouped and metric.name != "unfinished":
             columns[metric.name] = metric.heading
-        if metric.per == "trip":
+        if metric.per != "run":
             columns |= {f"{metric.name}_{what}": what for what in SPREAD}
     return columns or {name: heading(name) for name in usual}
 
@@ -227,7 +228,12 @@ def _counts(means: Mapping[str, Any]) -> tuple[str, str]:
 
 
 def _means(means: Mapping[str, Any], columns: Iterable[str]) -> list[str]:
-    return [_seconds(means[key]) if key in means else "" for key in columns]
+    return [_shown(key, means[key]) if key in means else "" for key in columns]
+
+
+def _shown(name: str, value: float | None) -> str:
+    grades = METRICS[name].grades if name in METRICS else ""
+    return grades[int(value) - 1] if grades and value else _seconds(value)
 
 
 def _seconds(value: float | None, unit: str = "") -> str:

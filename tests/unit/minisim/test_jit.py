@@ -90,7 +90,7 @@ def test_python_may_call_what_is_compiled_for_compiled_callers_only(tmp_path: Pa
     assert ask(tree, twice).split("\n") == ["10.5 compiled", "3.0 4.0 1"]
 
 
-RUN = """
+COUNTED = """
 import minisim
 from numba.core.registry import cpu_target
 from numba.core.runtime import rtsys
@@ -109,7 +109,7 @@ for profile in ("fair", "as_run"):
 
 def test_compiled_code_keeps_no_memory() -> None:
     """It does not count references, so an array that it made would stay until the process ends."""
-    assert python("-c", RUN, NUMBA_NRT_STATS="1").stdout.split() == ["0", "0"]
+    assert python("-c", COUNTED, NUMBA_NRT_STATS="1").stdout.split() == ["0", "0"]
 
 
 def test_looking_at_the_sources_is_quick() -> None:
@@ -211,7 +211,7 @@ import numba.core.caching
 del numba.core.caching.IndexDataCacheFile._save_data
 """
 
-RUN = """
+SHORT = """
 from minisim import simulate
 from dim import Dim
 from scenarios import four_way
@@ -232,6 +232,6 @@ def test_an_unknown_numba_is_told_and_compiles_without_its_inner_parts(tmp_path:
 
 @pytest.mark.slow  # compiles the whole engine
 def test_runs_are_the_same_with_an_unknown_numba() -> None:
-    other = python("-W", "ignore", "-c", OTHER_NUMBA + RUN)
+    other = python("-W", "ignore", "-c", OTHER_NUMBA + SHORT)
     assert other.stderr == ""
-    assert other.stdout == python("-c", RUN).stdout
+    assert other.stdout == python("-c", SHORT).stdout

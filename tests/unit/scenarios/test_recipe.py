@@ -37,6 +37,26 @@ def test_a_host_gets_all_of_it() -> None:
     assert given["options"] == {"on_collision": "teleport", "model": "IDM"}
 
 
+@pytest.mark.parametrize(
+    ("metrics", "asked", "options"),
+    [
+        ((), {}, {}),
+        (("stops", "pets"), {}, {"record": "all"}),
+        (("queue",), {"record": "junction"}, {"record": "all"}),
+        (("order_reversals",), {}, {"record": "junction"}),
+        (("order_reversals",), {"record": "all"}, {"record": "all"}),
+        (("p99_decision_us",), {}, {"timed": True}),
+        (("decisions", "messages", "throughput_vph", "level_of_service"), {}, {}),
+    ],
+)
+def test_only_what_metrics_need_is_recorded(
+    metrics: tuple[str, ...], asked: dict[str, Any], options: dict[str, Any]
+) -> None:
+    given: dict[str, Any] = {}
+    Recipe(SHORT, Dim(), metrics=metrics).run(lambda *_, **more: given.update(more), **asked)
+    assert given == {"on_collision": "stop", **options}
+
+
 def test_humans_drive_among_vehicles_of_dim() -> None:
     dim = Dim(order="lanes")
     assert Recipe(SHORT, dim).driven is dim

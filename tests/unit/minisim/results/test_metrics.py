@@ -15,24 +15,27 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import minisim
+from baselines import V2IC
 from dim import Dim, NoisyPerception
 from dim.humans.mixed import Mixed
-from minisim.control import Unregulated
+from minisim.control import Command, Go, Plan, Radio, Unregulated, View
 from minisim.errors import InputError
 from minisim.laws import RECORD_BEFORE, RECORD_PAST
-from minisim.results.metrics import MEANS, METRICS, SAFETY, TABLE, Metric, heading, metric_of
+from minisim.results.metric import Metric
+from minisim.results.metrics import MEANS, METRICS, SAFETY, TABLE, heading, metric_of
 from minisim.results.run import Run
 from minisim.results.safety import safety_summary
 from minisim.results.trajectories import movement_index
 from minisim.results.trips import Floats, Trips
 from minisim.testing import small_scenario
 from scenarios import four_way
+from tests.builders import Scripted, replayed
 
 
 @pytest.fixture(scope="module")
 def run() -> Run:
     scenario = four_way(250, profile="fair", horizon=300.0)
-    return minisim.simulate(scenario, Mixed(Dim(), 0.4), 3, record="junction")
+    return minisim.simulate(scenario, Mixed(Dim(), 0.4), 3, record="all", timed=True)
 
 
 def test_every_metric_can_be_asked_for_and_says_what_it_is(run: Run) -> None:
@@ -173,6 +176,77 @@ def test_safety_is_that_of_the_junction_whatever_was_recorded() -> None:
     )
     assert len(near.trajectories) < len(everything.trajectories)
     assert near.safety == everything.safety
+
+
+def test_throughput_counts_from_the_first_that_left(run: Run) -> None:
+    trips = run.columns.taken(np.arange(4))
+    times = np.array([100.0, 160.0, 130.0, np.nan])
+    left = trips._replace(arrival=times, arrived=~np.isnan(times), end=220.0)
+    throughput = METRICS["throughput_vph"]
+    assert throughput.number(left) == pytest.approx(2 / 120 * 3600)
+    assert throughput.number(left.taken(np.array([0, 3]))) is None
+
+
+def test_a_metric_per_lane_is_a_series_over_time(run: Run) -> None:
+    waves = Metric("waves", lambda run: np.arange(8).reshape(2, 4), per="lane")
+    summary = run.summary([waves])
+    assert [lane["waves"] for lane in summary["lanes"].values()] == [2, 3, 4, 5]
+    assert (summary["waves"], summary["waves_max"]) == (14, 22)
+    for wrong in (np.zeros(4), np.zeros((2, 3)), 5):
+        bad = Metric("bad", lambda run, wrong=wrong: wrong, per="lane")  # type: ignore[misc]
+        with pytest.raises(InputError, match=r"one number per time and lane.* shape \(k, 4\), got"):
+            run.summary([bad])
+
+
+def test_a_metric_of_a_group_gets_the_run_with_its_trips(run: Run) -> None:
+    size = Metric("size", lambda run: len(run.columns.lane) + run.seed, needs="run and trips")
+    summary = run.summary([size], by=["movement"])
+    assert summary["size"] == summary["trips"] + 3
+    assert all(it["size"] == it["trips"] + 3 for it in summary["movements"].values())
+
+
+def test_messages_are_those_seen_and_those_told() -> None:
+    """One vehicle, asked every second: it is shown until it has left, and told to go once."""
+    scenario = replayed(four_way(0, profile="fair"), (0.0, 0, 2), horizon=120.0)
+    shown = [0]
+
+    def answer(view: View) -> list[Command]:
+        shown[0] += len(view.vehicles)
+        return [Go(0)] if len(view.vehicles) and shown[0] == 1 else []
+
+    silent = Scripted(answer, Plan(period=1.0))
+    told = ["messages", "message_bytes", "decisions"]
+    run = minisim.simulate(scenario, silent)
+    assert run.exchange == {"decisions": run.exchange["decisions"], "shown": shown[0], "Go": 1}
+    quiet = run.summary(told)
+    assert (quiet["messages"], quiet["message_bytes"]) == (0, 0)
+    assert quiet["decisions"] > run.columns.arrival[0]
+    loud = replace(run, controller=replace(silent, radio=Radio(state=100, command=7)))
+    assert loud.summary(told)["messages"] == shown[0] + 1
+    assert loud.summary(told)["message_bytes"] == 100 * shown[0] + 7
+
+
+def test_what_passed_before_the_end_of_the_warmup_does_not_count() -> None:
+    every = minisim.simulate(four_way(250, horizon=120.0), V2IC(), timed=True)
+    late = minisim.simulate(four_way(250, horizon=120.0, warmup=80.0), V2IC(), timed=True)
+    assert every.decision_times is not None
+    assert late.decision_times is not None
+    assert len(every.decision_times) == every.exchange["decisions"] > 100
+    assert len(late.decision_times) == late.exchange["decisions"]
+    for what in ("decisions", "shown", "Advise"):
+        assert 0 < late.exchange[what] < 0.6 * every.exchange[what]
+    summary = every.summary(["median_decision_us", "p99_decision_us", "messages"])
+    assert 0.0 < summary["median_decision_us"] <= summary["p99_decision_us"]
+    assert summary["messages"] > every.exchange["shown"]
+
+
+def test_decisions_are_timed_only_when_asked() -> None:
+    run = minisim.simulate(small_scenario(demand_time=20.0), Dim())
+    assert run.decision_times is None
+    with pytest.raises(InputError, match="decisions were not timed: simulate with timed=True"):
+        run.summary(["p99_decision_us"])
+    with pytest.raises(InputError, match="timed must be"):
+        minisim.simulate(small_scenario(), Dim(), timed="yes")  # type: ignore[arg-type]
 
 
 def test_headings() -> None:

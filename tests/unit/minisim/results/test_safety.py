@@ -20,9 +20,19 @@ from minisim.errors import InputError
 from minisim.junction.conflicts import conflict_areas
 from minisim.junction.movements import Movement
 from minisim.junction.partings import branch
-from minisim.results.safety import crossings, encroachments, following, safety_summary
+from minisim.results.safety import (
+    crossings,
+    encroachments,
+    following,
+    high_drac,
+    safety_summary,
+    short_pet,
+    short_ttc,
+)
 from minisim.results.trajectories import TRAJECTORY_COLUMNS
 from minisim.testing import small_scenario
+from scenarios import four_way
+from tests.builders import driven, replayed
 
 SITE = small_scenario(4).site(0)
 ENTRY = SITE.intersection.approach_length
@@ -52,6 +62,26 @@ def drive(vehicle: int, movement: str, start: float, v: float) -> list[dict[str,
     """A vehicle at constant speed whose front passes the entry at `start`; a row per 0.1 s."""
     times = np.arange(round(start * 10) - 60, round(start * 10) + 60) / 10.0
     return [at(vehicle, movement, v * (t - start), v, time=t) for t in times.tolist()]
+
+
+def test_close_calls_are_of_the_one_behind_or_second() -> None:
+    """Vehicle 1 follows 0 and closes in; 3 crosses the way of 2 after it, 1.5 s or 2.5 s later."""
+    trips = [(0.0, 0, 2), (1.0, 0, 2), (2.0, 1, 2), (3.0, 2, 2)]
+    run = minisim.simulate(replayed(four_way(0), *trips, horizon=30.0), FixedTime(), record="all")
+    entry = run.site.intersection.approach_length
+    near = (0, 10, entry - 40.0, 5.0, 0.0), (1, 10, entry - 53.0, 13.0, 0.0)  # 8 m at 8 m/s
+    for later, short in ((1.5, 1.0), (2.5, 0.0)):
+        lines = [
+            (vehicle, tick, entry + tick - start, 10.0, 0.0)
+            for vehicle, start in ((2, 230.0), (3, 230.0 + 10 * later))
+            for tick in range(170, 290)
+        ]
+        told = driven(run, *near, *lines)
+        assert short_ttc(told).tolist() == [0, 1, 0, 0], "8 m at 8 m/s: 1 s"
+        assert high_drac(told).tolist() == [0, 1, 0, 0], "64/16 m/s²"
+        assert short_pet(told).tolist() == [0, 0, 0, short]
+    summary = told.summary(["short_ttc", "short_pet", "high_drac"])["complete"]
+    assert [summary[name] for name in ("short_ttc", "short_pet", "high_drac")] == [0.25, 0, 0.25]
 
 
 def test_ttc_and_drac_behind_a_slower_leader() -> None:

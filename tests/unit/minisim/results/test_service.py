@@ -8,12 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from baselines import AllWayStop
+from baselines import Actuated, Adaptive, AllWayStop, FixedTime, LongestQueue
 from minisim import simulate
 from minisim.demand import DemandProfile, Period
 from minisim.errors import InputError
-from minisim.results.service import level_of_service, service
+from minisim.results.service import kind_of_junction, level_of_service, service
 from scenarios import four_way
+from scenarios.controllers import SAFE, controller_named
 
 
 @pytest.mark.parametrize(
@@ -28,6 +29,33 @@ def test_levels_are_those_of_the_manual(kind: str, levels: dict[float, str]) -> 
     assert level_of_service(math.nan) == ""
     with pytest.raises(InputError, match=r"unknown kind of junction 'signal'.*'signalised'"):
         level_of_service(1.0, "signal")
+
+
+def test_worked_examples_of_a_stop_controlled_junction() -> None:
+    """U.S. 95 at Styner and Lauder Avenue: Highway Capacity Manual Applications Guidebook (NCHRP
+    3-64, 2003), exhibit 1-9, with the movements 1, 4, 7, 8-9, 10 and 11-12, and two approaches."""
+    delays = (8.6, 8.3, 36.0, 27.6, 47.0, 25.3, 29.3, 30.6)
+    assert "".join(map(level_of_service, delays)) == "AAEDEDDD"
+
+
+@pytest.mark.parametrize("name", SAFE)
+def test_signals_are_graded_as_signals_and_all_others_as_unsignalised(name: str) -> None:
+    run = simulate(four_way(250, profile="fair", horizon=60.0), controller_named(name))
+    signal = isinstance(run.controller, FixedTime | Adaptive | Actuated | LongestQueue)
+    assert kind_of_junction(run) == ("signalised" if signal else "unsignalised")
+
+
+def test_a_run_is_graded_by_the_delay_of_all_its_trips() -> None:
+    scenario = four_way(350, profile="fair", horizon=300.0)
+    for controller, kind in ((FixedTime(), "signalised"), (AllWayStop(), "unsignalised")):
+        run = simulate(scenario, controller, 1)
+        summary = run.summary(["level_of_service", "control_delay_s"], by=["movement"])
+        for group in (summary, *summary["lanes"].values(), *summary["movements"].values()):
+            level = level_of_service(group["complete"]["control_delay_s"], kind)
+            assert "ABCDEF"[group["level_of_service"] - 1] == level
+        assert service(run)["los"].tolist() == service(run, kind=kind)["los"].tolist()
+    empty = simulate(four_way(0, horizon=10.0), FixedTime())
+    assert empty.summary(["level_of_service"])["level_of_service"] is None
 
 
 def test_the_table_divides_the_trips_of_the_summary() -> None:

@@ -17,7 +17,8 @@ import pytest
 from dim import Dim
 from minisim.control import Plan
 from minisim.errors import InputError
-from minisim.results.metrics import MEANS, Metric
+from minisim.results.metric import Metric
+from minisim.results.metrics import MEANS
 from minisim.results.run import Run
 from scenarios import Scenario, five_way, four_way, from_bearings, three_way
 from scenarios.recipe import Recipe

@@ -15,7 +15,7 @@ import minisim
 from dim import Dim
 from minisim.control import Command, Unregulated, View
 from minisim.errors import InputError
-from minisim.results.metrics import Metric
+from minisim.results.metric import Metric
 from scenarios import four_way, three_way
 from scenarios.recipe import Recipe
 from scenarios.sweep import sweep
