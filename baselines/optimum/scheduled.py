@@ -24,6 +24,7 @@ from baselines.optimum.planning import drivable
 from baselines.prediction import predict
 from baselines.reservation import Manager, Reservation, ReservationSession, Slot
 from minisim.control import Advise, Command, Cover, Observed, Plan, Site, View
+from minisim.errors import InputError, integer, items, number, show
 from minisim.junction.coordination import STEP, Region, region
 from minisim.parameters import checked, declared, real
 
@@ -52,8 +53,16 @@ class Turn(NamedTuple):
     time: float  #: when it passes its mark [s]
 
 
-def _turns(_: str, value: Any) -> tuple[Turn, ...]:
-    return tuple(Turn(*it) for it in value)
+def _turns(title: str, value: Any) -> tuple[Turn, ...]:
+    made = []
+    for k, it in enumerate(items(title, value, "turns")):
+        place = f"turn {k + 1} of {title}"
+        turn = items(place, it, "lane, rank, kind and time")
+        if len(turn) != len(Turn._fields):
+            raise InputError(f"{place} must be {', '.join(Turn._fields)}, got {show(it)}")
+        lane, rank, kind = (integer(place, one, low=0) for one in turn[:3])
+        made.append(Turn(lane, rank, kind, number(f"time of {place} [s]", turn[3])))
+    return tuple(made)
 
 
 @declared
