@@ -87,7 +87,7 @@ def test_nor_has_one_lane_whatever_its_vehicles_are_told(
 
 
 @given(bursts())
-@share(0.2)
+@share(0.1)
 def test_the_schedule_can_be_driven(scenario: Scenario) -> None:
     check(scenario, optimum(scenario).schedule)
 

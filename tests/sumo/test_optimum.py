@@ -9,7 +9,9 @@ from scenarios.optimum import compared, optimum
 from scenarios.profiles import FAIR, PAPER, Profile
 
 
-@pytest.mark.parametrize("profile", [FAIR, PAPER], ids=lambda it: it.name)
+@pytest.mark.parametrize(
+    "profile", [PAPER, pytest.param(FAIR, marks=pytest.mark.slow)], ids=lambda it: it.name
+)
 def test_no_controller_has_less_delay_than_the_bound(profile: Profile) -> None:
     scenario = four_way(profile=profile, density=250.0, horizon=60.0)
     least = optimum(scenario)

@@ -66,7 +66,7 @@ def write(folder: Path, *, decorator: str = "njit", factor: float = 0.5, body: s
     (folder / "outside" / "rule.py").write_text(text)
 
 
-@pytest.mark.parametrize("decorator", ["njit", "njit_inner", "njit_inline"])
+@pytest.mark.parametrize("decorator", ["njit_inner", "njit_inline"])
 def test_a_change_of_what_is_called_is_seen(tmp_path: Path, decorator: str) -> None:
     tree = copied(tmp_path)
     write(tree, decorator=decorator)
