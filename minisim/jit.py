@@ -167,13 +167,14 @@ def _cache_class() -> Any:
 
         def save(self, key: Any, data: Any) -> None:
             """Write the code, under a name that no other code has, then the index."""
-            kept = self._load_index()  # type: ignore[no-untyped-call]  # numba has no types
+            own: Any = self  # numba has no types
+            kept = own._load_index()
             if not kept:
                 self._remove_old()
             digest = hashlib.sha256(repr((self._source_stamp, key)).encode()).digest()
-            name = self._data_name(int.from_bytes(digest[:8]))  # type: ignore[no-untyped-call]
-            self._save_data(name, data)  # type: ignore[no-untyped-call]
-            self._save_index({**kept, key: name})  # type: ignore[no-untyped-call]
+            name = own._data_name(int.from_bytes(digest[:8]))
+            own._save_data(name, data)
+            own._save_index({**kept, key: name})
 
         def _remove_old(self) -> None:
             for old in Path(self._cache_path).glob(f"{Path(self._index_name).stem}.*.nbc"):
@@ -183,10 +184,11 @@ def _cache_class() -> Any:
         """numba's cache on disk, valid only as long as none of our sources changes."""
 
         def __init__(self, function: Callable[..., object]) -> None:
-            super().__init__(function)  # type: ignore[no-untyped-call]  # as above
+            super().__init__(function)  # type: ignore[no-untyped-call]  # numba has no types
             folder = Path(inspect.getfile(function)).parent
             sources = numba.__version__, _digest(folder), _digest(Path(__file__).parent)
-            files = Files(self._cache_path, self._impl.filename_base, sources)  # type: ignore[no-untyped-call]
+            make: Any = Files
+            files = make(self._cache_path, self._impl.filename_base, sources)
             files._version = sources  # where it differs, numba does not read classes that are gone
             self._cache_file = files
 
@@ -194,8 +196,9 @@ def _cache_class() -> Any:
             """The code on disk; None if there is none, and it has to be compiled."""
             # numba's would first load what only its compiler needs, all of scipy.linalg included.
             rtsys.initialize(target_context)  # for code that makes arrays
-            with self._guard_against_spurious_io_errors():
-                found = self._load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+            own: Any = self
+            with own._guard_against_spurious_io_errors():
+                found = own._load_overload(sig, target_context)
             if found is None:
                 _announce()
             return found
