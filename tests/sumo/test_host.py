@@ -375,7 +375,7 @@ def test_a_missing_program_is_told(monkeypatch: pytest.MonkeyPatch, tmp_path: Pa
 
 
 @pytest.fixture
-def children(monkeypatch: pytest.MonkeyPatch) -> list[subprocess.Popen[bytes]]:
+def children(monkeypatch: pytest.MonkeyPatch, started: None) -> list[subprocess.Popen[bytes]]:
     """The worker processes that a test starts."""
     started: list[subprocess.Popen[bytes]] = []
     popen = subprocess.Popen
@@ -543,6 +543,7 @@ def test_an_ended_command_leaves_nothing_behind(
         time.sleep(0.02)
 
 
+@pytest.mark.usefixtures("started")
 def test_no_environment_variable_is_needed_or_left(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("SUMO_HOME", raising=False)
     before = dict(os.environ)
@@ -554,6 +555,7 @@ def test_no_environment_variable_is_needed_or_left(monkeypatch: pytest.MonkeyPat
 RUN = ("run", "four-way", "-p", "fair", "-d", "300", "--horizon", "120")
 
 
+@pytest.mark.usefixtures("started")
 def test_the_command_line_hosts_in_sumo(capsys: Captured, tmp_path: Path) -> None:
     printed = answer(capsys, *RUN, "--host", "sumo", "--keep-files", str(tmp_path / "kept"))
     assert (tmp_path / "kept" / "minisim.net.xml").is_file()
