@@ -55,13 +55,16 @@ def started(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 RUN_TOOL = network.run_tool
+INPUTS = network.NODES, network.EDGES, network.CONNECTIONS
 NETWORKS: dict[object, bytes] = {}
 
 
 def converted(command: list[str], folder: Path, home: Path) -> None:
-    """The network as netconvert builds it, or has built it from the same files."""
-    inputs = [folder / name for name in (network.NODES, network.EDGES, network.CONNECTIONS)]
-    key = (*command, *(file.read_bytes() for file in inputs if file.exists()))
+    """The host's network as netconvert builds it, or has built it from the same files."""
+    if network.NETWORK not in command:
+        RUN_TOOL(command, folder, home)
+        return
+    key = (*command, *((folder / name).read_bytes() for name in command if name in INPUTS))
     if key not in NETWORKS:
         RUN_TOOL(command, folder, home)
         NETWORKS[key] = (folder / network.NETWORK).read_bytes()

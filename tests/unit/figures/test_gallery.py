@@ -287,10 +287,11 @@ def test_report_names_everything(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     assert "the store has no run of gate" in (tmp_path / "report.md").read_text(encoding="utf-8")
 
 
-def test_a_report_has_nothing_of_others(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_report_has_nothing_of_others(
+    archive: Archive, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(report, "GALLERY", {name: GALLERY[name] for name in FEW})
     made = [Made("gate", 60, 60.0, 60, 1.0, 1.0, ())]
-    archive = Archive(synthetic_find, EFFORT)
     assert report.write_report(archive, made, 2, tmp_path, lambda *_: None, parts=("gate",)) == 1
     assert {file.stem for file in (tmp_path / "figures").iterdir()} == {"gate"}
     text = (tmp_path / "report.md").read_text(encoding="utf-8")
@@ -303,7 +304,11 @@ def test_a_report_has_nothing_of_others(tmp_path: Path, monkeypatch: pytest.Monk
     assert "- fair: " not in text
 
 
-def test_collisions_of_published_rules_have_their_cause(tmp_path: Path) -> None:
+def test_collisions_of_published_rules_have_their_cause(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    name = "comparison-as-run"
+    monkeypatch.setattr(report, "GALLERY", {name: GALLERY[name]})
     crashed = having(lambda e: e.label == "dim", Effort.of(quick=True), collisions=2)
     report.write_report(crashed, [], 1, tmp_path, lambda done, total: None, parts=("as-run",))
     text = (tmp_path / "report.md").read_text(encoding="utf-8")
