@@ -8,6 +8,9 @@ PIP    := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c co
 # One worker a core; beyond 8, starting them costs more than they save.
 TEST   := $(BIN)/python -m pytest -n auto --maxprocesses 8 --dist worksteal
 
+# Each process that a test starts would compile all that it imports again.
+unexport PYTHONDONTWRITEBYTECODE
+
 .DEFAULT_GOAL := help
 .PHONY: help demo test test-all lint bench mutants pictures figures reproduce clean
 

@@ -6,6 +6,7 @@ same, in a process of its own. Tests of the start itself use the fixture `starte
 
 from __future__ import annotations
 
+import gc
 import os
 import pickle
 import signal
@@ -99,6 +100,7 @@ if __name__ == "__main__":
 
     from minisim.sumo.worker import main
 
+    gc.freeze()  # what is loaded need not be looked at, and so copied, in every fork
     with socket.socket(fileno=int(sys.argv[1])) as caller:
         called = forked(caller)
     if called:
