@@ -212,10 +212,11 @@ def test_it_is_needed_where_two_lanes_may_meet() -> None:
         assert monitors.needed is needed, (cars, going)
 
 
-def conflicting() -> list[tuple[int, int]]:
+def conflicting() -> list[Any]:
+    """Every two movements in conflict; those without lane a are rotations of others."""
     m = MATRIX.movements
     return [
-        (p, q)
+        pytest.param(p, q, marks=pytest.mark.slow if m[p].origin else ())
         for p, q in itertools.product(range(len(m)), repeat=2)
         if m[p].origin < m[q].origin and not MATRIX.values[p, q]
     ]
