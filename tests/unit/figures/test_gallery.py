@@ -6,7 +6,7 @@ import csv
 import io
 import re
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import combinations
 from pathlib import Path
 from types import ModuleType
@@ -33,6 +33,7 @@ from scenarios.studies.fairness import PRIORITIES
 from scenarios.studies.shared.archive import Archive, MissingRunsError, missing_note
 from scenarios.studies.shared.effort import Effort, Search
 from scenarios.studies.shared.reproduction import Made
+from scenarios.studies.shared.study import Study
 from scenarios.sweep.cells import saturated
 from scenarios.sweep.keys import key_of
 from tests import ROOT
@@ -40,6 +41,23 @@ from tests.builders import capacity_of, reference_value, synthetic_find, synthet
 
 SEARCH = Search(step=20.0, steps=64, seeds=2)
 EFFORT = Effort(seeds=2, search=SEARCH)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _recipes_once() -> Iterator[None]:
+    """Make the recipes of a study once, whatever is known of their runs."""
+    kept: dict[object, Any] = {}
+    runs = Study.runs
+
+    def once(study: Study, *asked: Any) -> Any:
+        key = study.name, *asked
+        if key not in kept:
+            kept[key] = runs(study, *asked)
+        return kept[key]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Study, "runs", once)
+        yield
 
 
 @pytest.fixture(scope="module")
