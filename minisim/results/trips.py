@@ -15,6 +15,8 @@ from minisim.junction.movements import Movements
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
+#: A table by the names of its columns.
+Columns = dict[str, npt.NDArray[Any]]
 
 
 class Trips(NamedTuple):
