@@ -24,7 +24,7 @@ from minisim.simulation import Simulation
 from scenarios import four_way
 from scenarios.controllers import controller_named
 
-#: The fastest that we found, rounded as in Python: no two operations in one.
+#: The fastest that we found. The last one is for results as in Python: no two operations in one.
 FLAGS = ("-O3", "-march=native", "-fno-math-errno", "-ffp-contract=off")
 
 #: `TRAITS`, and 2√(ab), which the kernel does not compute anew at every step either.
@@ -32,20 +32,6 @@ TYPE = np.dtype([*TRAITS.descr, ("root", np.float64)])
 
 #: `Law`, all of it as floats.
 LAW = np.dtype([(name, np.float64) for name in Law._fields])
-
-
-class World(ctypes.Structure):
-    """The arrays of a run, as step.c has them."""
-
-    _fields_ = (
-        ("vehicles", ctypes.c_void_p),
-        ("lanes", ctypes.c_void_p),
-        ("lane_count", ctypes.c_int64),
-        ("law", ctypes.c_void_p),
-        *((name, ctypes.c_void_p) for name in ("ends", "start", "speed", "branch", "types")),
-        ("paths", ctypes.c_int64),
-        ("sections", ctypes.c_int64),
-    )
 
 
 def vehicle_step(seed: int, density: float, horizon: float = 3600.0) -> float:
@@ -68,12 +54,13 @@ def call(
     """Call `take` or `timed` of step.c, which move the vehicles."""
     types = np.array([(*it, 2.0 * math.sqrt(it.a * it.b)) for it in layout.types], TYPE)
     laws = np.array(tuple(law), LAW)
-    road = layout.ends, layout.section_start, layout.section_speed, layout.branch, types
-    world = World(
-        vehicles.ctypes.data, lanes.ctypes.data, len(lanes), laws.ctypes.data,
-        *(table.ctypes.data for table in road), *layout.section_start.shape,
+    arrays = (
+        vehicles, lanes, laws, layout.ends, layout.section_start, layout.section_speed,
+        layout.branch, types,
     )  # fmt: skip
-    return getattr(library(), function)(ctypes.byref(world), steps)
+    numbers = len(lanes), *layout.section_start.shape
+    world = np.array([*(it.ctypes.data for it in arrays), *numbers], np.int64)  # `World` there
+    return getattr(library(), function)(world.ctypes, steps)
 
 
 @cache

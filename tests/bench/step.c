@@ -13,22 +13,16 @@ static const double HALTING = 0.1, STOP_MARGIN = 0.25;
 
 typedef struct { double exit, length, exit_arm, start; } Ends;
 
-/* `minisim.engine.state.Layout`, as far as a step needs it. */
+/* The arrays of a run, those of paths as in minisim.engine.state.Layout. All fields have 8 bytes. */
 typedef struct {
+    Vehicle *vehicles;
+    const Lane *lanes;
+    const Law *law;
     const Ends *ends;             /* (paths) */
     const double *start, *speed;  /* (paths, sections) */
     const double *branch;         /* (paths, paths) */
     const Type *types;
-    int64_t paths, sections;
-} Layout;
-
-/* The arrays of a run. */
-typedef struct {
-    Vehicle *vehicles;
-    const Lane *lanes;
-    int64_t lane_count;
-    const Law *law;
-    Layout layout;
+    int64_t lane_count, paths, sections;
 } World;
 
 static inline double least(double x, double y) { return y < x ? y : x; }
@@ -139,20 +133,19 @@ static inline double hold(double v, double s, const Type *me, const Law *law)
 /* oracle.py */
 
 /* Whether the rear of `ahead`, at `rear`, is still on path p. */
-static inline bool shares(const Vehicle *ahead, double rear, int64_t p, const Layout *layout)
+static inline bool shares(const Vehicle *ahead, double rear, int64_t p, const World *world)
 {
-    return ahead->status == DRIVING && rear < layout->branch[ahead->path * layout->paths + p];
+    return ahead->status == DRIVING && rear < world->branch[ahead->path * world->paths + p];
 }
 
 /* Choose the acceleration of row i from the present state; returns whether it overlaps another. */
 static inline bool accelerate(World *world, const Lane *lane, int64_t i)
 {
     Vehicle *vehicles = world->vehicles, *me = vehicles + i;
-    const Layout *layout = &world->layout;
     const Law *law = world->law;
-    const Type *mine = layout->types + me->type;
+    const Type *mine = world->types + me->type;
     const int64_t p = me->path;
-    const Ends ends = layout->ends[p];
+    const Ends ends = world->ends[p];
     const double s = me->s, v = me->v;
     const bool released = lane->open || me->go;
     bool overlap = false;
@@ -163,7 +156,7 @@ static inline bool accelerate(World *world, const Lane *lane, int64_t i)
     for (; j >= lane->first; j--) {
         const Vehicle *ahead = vehicles + j;
         const double rear = ahead->s - ahead->length;
-        if (shares(ahead, rear, p, layout)) {
+        if (shares(ahead, rear, p, world)) {
             z = gap_ratio(v, rear - s, ahead->v, mine);
             room = room_behind(rear - s, ahead->v, ahead->b_max, mine, law);
             overlap |= rear <= s;
@@ -179,7 +172,7 @@ static inline bool accelerate(World *world, const Lane *lane, int64_t i)
         for (j = (lane->front < j ? lane->front : j) - 1; j >= lane->first; j--) {
             const Vehicle *ahead = vehicles + j;
             const double rear = ahead->s - ahead->length;
-            if (shares(ahead, rear, p, layout))
+            if (shares(ahead, rear, p, world))
                 room = least(room, room_behind(rear - s, ahead->v, ahead->b_max, mine, law));
         }
 
@@ -191,7 +184,7 @@ static inline bool accelerate(World *world, const Lane *lane, int64_t i)
         j = world->lanes[(int64_t)ends.exit_arm].last;
     if (j >= 0 && vehicles[j].status == DRIVING) {
         const Vehicle *ahead = vehicles + j;
-        const double rear = ahead->s - ahead->length - layout->ends[ahead->path].exit;
+        const double rear = ahead->s - ahead->length - world->ends[ahead->path].exit;
         const double gap = rear - (s - ends.exit);
         if (s >= law->entry || i == lane->front)
             z = most(z, gap_ratio(v, gap, ahead->v, mine));
@@ -200,8 +193,8 @@ static inline bool accelerate(World *world, const Lane *lane, int64_t i)
         overlap |= gap <= 0.0 && s >= ends.exit;
     }
 
-    const int64_t section = p * layout->sections + me->section;
-    const double *start = layout->start + section, *speed = layout->speed + section;
+    const int64_t section = p * world->sections + me->section;
+    const double *start = world->start + section, *speed = world->speed + section;
     double acc = drive(v, speed[0] * me->factor, me->advice, z, mine, law);
     for (int k = 1; braking_begins(v, start[k] - s, mine, law); k++)
         acc = least(acc, slow_down(v, acc, speed[k] * me->factor, start[k] - s, mine, law));
@@ -215,17 +208,18 @@ static inline bool accelerate(World *world, const Lane *lane, int64_t i)
 }
 
 /* Move a vehicle by one step, and add up waiting and loss. */
-static inline void move(Vehicle *me, const Layout *layout, double dt)
+static inline void move(Vehicle *me, const World *world)
 {
+    const double dt = world->law->dt;
     const double v = me->v + me->a * dt;
     me->s = v < 0.0 ? me->s - me->v * me->v / (2.0 * me->a)
                     : me->s + me->v * dt + 0.5 * me->a * dt * dt;
     me->v = v < 0.0 ? 0.0 : v;
     me->waiting_ticks += me->v <= HALTING;
-    const int64_t first = me->path * layout->sections;
-    while (me->s >= layout->start[first + me->section + 1])
+    const int64_t first = me->path * world->sections;
+    while (me->s >= world->start[first + me->section + 1])
         me->section++;
-    const double allowed = layout->speed[first + me->section] * me->factor;
+    const double allowed = world->speed[first + me->section] * me->factor;
     if (me->v < allowed)
         me->lost_ticks += 1.0 - me->v / allowed;
 }
@@ -243,7 +237,7 @@ bool take(World *world, int steps)
         for (const Lane *lane = world->lanes; lane < end; lane++)
             for (int64_t i = lane->first; i < lane->next; i++)
                 if (world->vehicles[i].status == DRIVING)
-                    move(world->vehicles + i, &world->layout, world->law->dt);
+                    move(world->vehicles + i, world);
     }
     return overlap;
 }
