@@ -97,8 +97,8 @@ def _inner(function: _F, **options: object) -> _F:
 
     parts, dispatcher = _inner_classes()
     chosen: dict[str, Any] = {**_OPTIONS, **options, "pipeline_class": parts}
-    wrappers = dict.fromkeys(("no_cpython_wrapper", "no_cfunc_wrapper"), True)
-    compiled: Any = numba.njit(**chosen, **wrappers)(function)
+    chosen |= dict.fromkeys(("no_cpython_wrapper", "no_cfunc_wrapper"), True)
+    compiled: Any = numba.njit(**chosen)(function)
     compiled.__class__ = dispatcher
     return cast(_F, compiled)
 
@@ -141,7 +141,8 @@ def _inner_classes() -> tuple[type, type]:
 
         def compile_extra(self, func: Callable[..., object]) -> Any:
             own: Any = self
-            own.state.library = Part(own.state.targetctx.codegen(), func.__qualname__)
+            part: Any = Part
+            own.state.library = part(own.state.targetctx.codegen(), func.__qualname__)
             extra: Any = super().compile_extra
             return extra(func)
 
