@@ -11,21 +11,20 @@ from __future__ import annotations
 
 import hashlib
 import inspect
-import os
-import sys
 import warnings
 from collections.abc import Callable, Hashable, Sequence
 from functools import lru_cache
 from importlib import import_module
-from multiprocessing import parent_process
 from pathlib import Path
 from typing import Any, TypeVar, cast
+
+from minisim.compiling import announce, switched_off
 
 _F = TypeVar("_F", bound=Callable[..., object])
 
 
 def _enabled() -> bool:
-    if os.environ.get("MINISIM_JIT", "1") == "0":
+    if switched_off():
         return False
     try:
         import numba
@@ -254,17 +253,10 @@ def _cache_class() -> Any:
             with own._guard_against_spurious_io_errors():
                 found = own._load_overload(sig, target_context)
             if found is None:
-                _announce()
+                announce()
             return found
 
     return SourcesCache
-
-
-@lru_cache
-def _announce() -> None:
-    """Tell a user at a terminal, once, what takes so long."""
-    if parent_process() is None and sys.stderr is not None and sys.stderr.isatty():
-        sys.stderr.write("minisim: compiling, once after installation; this takes a while\n")
 
 
 @lru_cache
