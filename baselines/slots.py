@@ -1,0 +1,76 @@
+"""Slots for single vehicles or for batches of them: FAIR and BATCH.
+
+Source: Tachet, Santi, Sobolevsky, Reyes-Castro, Frazzoli, Helbing, Ratti, PLOS ONE 11(3), 2016,
+e0149607. Vehicles ask for a slot, the time of their access to the junction. Two vehicles that
+access it one after the other keep a tailgate distance if they are of the same flow, and a stopping
+distance, which is larger, if they are not. FAIR serves them first come, first served, each at the
+earliest time. Under BATCH, the first vehicle that has none gets its slot under FAIR. Vehicles that
+could have come by then are its batch, N at most. In a batch, those of the same flow are served in a
+row, the first vehicle's flow first. A batch of one is FAIR.
+
+The source has two flows of which any two vehicles are in conflict. With more, the next in a batch
+is the first vehicle of a lane that can come earliest, which is the same for two. Distances follow
+from car following and from the conflict zones of the movements, so movements in harmony do not wait
+for each other: FAIR is first come, first served by conflict zones. The source leaves N open.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import takewhile
+
+from baselines.flows import FlowSession, Lines, Waiting
+from baselines.prediction import Floats
+from baselines.reservation import Reservation
+from minisim.control import Cover, Radio, Site
+from minisim.names import Name
+from minisim.parameters import declared, real, whole
+
+
+@declared
+class Slots:
+    """Slots for batches of connected vehicles (BATCH), or for one at a time (`batch=1`: FAIR)."""
+
+    name = Name("slots")
+    covers = Cover(alike=True)
+    radio = Radio()
+
+    batch: int = whole(
+        "most vehicles that are served in another order than they came; 1 is first come, first "
+        "served", low=1, high=1000, default=10,
+    )  # fmt: skip
+    buffer: float = real(
+        "time between one vehicle's leaving a conflict zone and another's entering its own", "s",
+        low=0, high=10, default=Reservation().buffer,
+    )  # fmt: skip
+    period: float = real("time between two looks", "s", low=0.01, high=10, default=0.5)
+
+    def start(self, site: Site) -> FlowSession:
+        """Begin a run; raises `InputError` for vehicles whose motion cannot be predicted."""
+        self.covers.check(self.name, site.vehicle)
+        protocol = Reservation(buffer=self.buffer, period=self.period)
+        return FlowSession(Batch(self.batch), site, protocol)
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Batches of so many vehicles at most."""
+
+    size: int
+    rest: frozenset[int] = frozenset()  #: ids of those of the batch that have not been served
+
+    def choose(self, lines: Lines, free: Floats, clock: float) -> tuple[int, Batch]:  # noqa: ARG002
+        """The vehicle of the batch that can come first; of several, that which asked first."""
+
+        def slot(it: Waiting) -> float:
+            return max(it.ready, float(free[it.kind]))
+
+        heads = {lane: line[0] for lane, line in enumerate(lines) if line}
+        rest = self.rest
+        if not any(it.id in rest for it in heads.values()):
+            start = slot(min(heads.values(), key=lambda it: it.request))
+            come = [it for line in lines for it in takewhile(lambda it: it.came <= start, line)]
+            rest = frozenset(it.id for it in sorted(come, key=lambda it: it.request)[: self.size])
+        batch = {lane: it for lane, it in heads.items() if it.id in rest}
+        lane = min(batch, key=lambda lane: (slot(batch[lane]), batch[lane].request))
+        return lane, Batch(self.size, rest - {batch[lane].id})
