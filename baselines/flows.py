@@ -6,13 +6,13 @@ between others. A rule chooses the lane of which the first vehicle is next. It l
 ahead than to vehicles that will have come by then.
 
 A session plans all vehicles in range with the rule, at every look anew, and has them driven in this
-order (`baselines.ordered`). A choice stands when its vehicle holds a passage. It gets it no earlier
-than has to be so that it need not brake, so vehicles that come later can still join.
+order (`baselines.ordered`). A choice stands once its vehicle holds a passage.
 """
 
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple, Protocol
@@ -22,9 +22,11 @@ import numpy as np
 from baselines.optimum.alone import drives
 from baselines.ordered import Due, OrderedSession, Times
 from baselines.prediction import Floats
-from baselines.reservation import Reservation
-from minisim.control import Command, Observed, Plan, Site, View
+from baselines.reservation import Manager
+from minisim.control import Command, Cover, Observed, Radio, Site, View, stopping_distance
 from minisim.junction.conflicts import conflict_zones
+from minisim.names import Name
+from minisim.parameters import declared, real
 
 #: Least separation of vehicles in conflict [s]: the first one comes before the second.
 LEAST = 0.01
@@ -92,32 +94,61 @@ def separations(site: Site, buffer: float) -> Floats:
     own, each driving alone.
     """
     junction, ways, types = site.intersection, drives(site), site.types
-    m, same = len(junction.movements), ~junction.movements.apart
-    zones = [conflict_zones(junction, it, site.fleet) for it in types]
-    kinds = [(k % m, k // m) for k in range(len(ways))]
+    m, same = len(junction.movements), np.tile(~junction.movements.apart, (len(types), len(types)))
+    zones = np.concatenate([conflict_zones(junction, it, site.fleet) for it in types])
+    first, last = (
+        np.array([way.until(row) for way, row in zip(ways, zones[..., end], strict=True)])
+        for end in (0, 1)
+    )
+    apart = np.tile(last, len(types)) + buffer - np.tile(first, len(types)).T
     speed = np.array([float(way.speed(0.0)) for way in ways])
-    gap = np.repeat([it.min_gap for it in types], m)
-    headway = np.repeat([it.headway for it in types], m)
-    comes = np.array([way.until(zones[t][p, :, 0]) for way, (p, t) in zip(ways, kinds, strict=True)])
-    between = np.full((len(ways), len(ways)), -math.inf)
-    for way, row, (p, t), v in zip(ways, between, kinds, np.minimum.outer(speed, speed), strict=True):
-        leaves = np.tile(way.until(zones[t][p, :, 1]), len(types))
-        apart = np.maximum(leaves + buffer - comes[:, p], LEAST)
-        behind = (types[t].length + gap) / v + headway
-        row[:] = np.where(np.tile(same[p], len(types)), behind, apart)
-    return np.nan_to_num(between, nan=-math.inf)
+    length, gap, headway = (
+        np.repeat([getattr(it, name) for it in types], m)
+        for name in ("length", "min_gap", "headway")
+    )
+    behind = np.add.outer(length, gap) / np.minimum.outer(speed, speed) + headway
+    between = np.where(same, behind, np.maximum(apart, LEAST))
+    return np.where(np.isnan(between), -math.inf, between)
+
+
+@declared
+class Flow(ABC):
+    """Connected vehicles are served by a rule, for vehicles whose drivers are alike."""
+
+    name = Name("flow")
+    covers = Cover(alike=True)
+    radio = Radio()
+
+    buffer: float | None = real(
+        "time between one vehicle's leaving a conflict zone and another's entering its own; none "
+        "means the time in which one at the limit drives its stopping distance", "s",
+        low=0, high=10, optional=True, default=None,
+    )  # fmt: skip
+    period: float = real("time between two looks", "s", low=0.01, high=10, default=0.5)
+
+    @property
+    @abstractmethod
+    def rule(self) -> Rule:
+        """By which lanes are served, as it is before the first vehicle."""
+
+    def start(self, site: Site) -> FlowSession:
+        """Begin a run; raises `InputError` for vehicles whose motion cannot be predicted."""
+        self.covers.check(self.name, site.vehicle)
+        return FlowSession(self, site)
 
 
 class FlowSession(OrderedSession):
     """One run, in the order of a rule."""
 
-    def __init__(self, rule: Rule, site: Site, protocol: Reservation) -> None:
-        ways = drives(site)
-        times = Times(separations(site, protocol.buffer), (0.0,) * len(ways), ways)
-        super().__init__(protocol, site, times)
-        self._commit, reach = self.plan.sight, min(REACH, site.intersection.approach_length)
-        self.plan = Plan(marks=(reach, self._commit), sight=reach)
-        self._rule = rule
+    def __init__(self, controller: Flow, site: Site) -> None:
+        buffer, ways = controller.buffer, drives(site)
+        if buffer is None:
+            limit = site.speed_limit
+            buffer = stopping_distance(limit, site.vehicle.deceleration) / limit
+        times = Times(separations(site, buffer), (0.0,) * len(ways), ways)
+        reach = min(REACH, site.intersection.approach_length)
+        super().__init__(Manager(site, buffer), controller.period, reach, site, times)
+        self._rule = controller.rule
         self._seen: Sequence[Observed] = ()
         self._asked: dict[int, tuple[int, float]] = {}  # how many before it, and when it would come
         self._count = 0  # of those that have asked

@@ -17,8 +17,8 @@ import numpy as np
 
 from baselines.optimum.alone import Drive
 from baselines.prediction import Floats
-from baselines.reservation import Reservation, ReservationSession, Slot
-from minisim.control import Advise, Command, Observed, Site, View
+from baselines.reservation import Manager, Reservation, ReservationSession, Slot
+from minisim.control import Advise, Command, Observed, Plan, Site, View
 
 #: Slowest advice [m/s], and how fast a vehicle accelerates on its way to the junction, as a share
 #: of what it can: the law accelerates less the nearer it is to the limit.
@@ -48,9 +48,11 @@ class Times(NamedTuple):
 class OrderedSession(ReservationSession):
     """One run: grants passages in an order, and slows the others down in time."""
 
-    def __init__(self, controller: Reservation, site: Site, times: Times) -> None:
-        super().__init__(controller, site)
-        self._commit = math.inf  # no vehicle holds a passage further before the entry [m]
+    def __init__(
+        self, manager: Manager, period: float, reach: float, site: Site, times: Times
+    ) -> None:
+        super().__init__(Reservation(period=period), site)
+        self.manager, self.plan = manager, Plan(marks=(reach,), sight=reach)
         self._advice: list[Command] = []
         self._alone: dict[int, float] = {}  # when each passes its mark if it drives on alone [s]
         self._between, self._past, self._drives = times
@@ -79,8 +81,7 @@ class OrderedSession(ReservationSession):
                 if slot is None:
                     alone = self._when(me, kind, now)
                     time = max(alone, float(free[kind]))
-                    near = me.distance <= self._commit and time - alone < EARLY
-                    if near and not blocked[kind]:
+                    if not blocked[kind] and time - alone < EARLY:
                         slot = self._passage(me, now, ahead.get(me.id))
                         time = max(time, alone + AGAIN)
                 if slot is not None:

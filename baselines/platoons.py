@@ -7,7 +7,7 @@ discipline of a polling model. Exhaustive: a lane is served until no vehicle of 
 Gated: only those are served that have come when its turn begins. Then it is the turn of the next
 lane, clockwise, in which a vehicle waits; if there is none, of the first vehicle that comes.
 
-We have no full text of the source. The model is the one that its delay formulas are about, for which
+We have no full text of the source. The model is the one of its delay formulas, for which
 Boon, Winands, Adan and van Wijk (Performance Evaluation 68, 2011, 290–306) have the method; that
 empty lanes are passed over, without a clearance time, is ours. Distances follow from car following
 and conflict zones (`baselines.flows`), so lanes in harmony may be served at once.
@@ -19,39 +19,29 @@ from dataclasses import dataclass
 from itertools import takewhile
 from typing import Literal
 
-from baselines.flows import FlowSession, Lines
+from baselines.flows import Flow, Lines
 from baselines.prediction import Floats
-from baselines.reservation import Reservation
-from minisim.control import Cover, Radio, Site
 from minisim.names import Name
-from minisim.parameters import declared, real, word
+from minisim.parameters import declared, word
 
 SERVICES = ("exhaustive", "gated")
 
 
 @declared
-class Platoons:
+class Platoons(Flow):
     """Connected vehicles form platoons, lane after lane."""
 
     name = Name("platoons")
-    covers = Cover(alike=True)
-    radio = Radio()
 
     service: Literal["exhaustive", "gated"] = word(
         "of a lane: until no vehicle waits, or only those that have come when its turn begins",
         SERVICES, default="exhaustive",
     )  # fmt: skip
-    buffer: float = real(
-        "time between one vehicle's leaving a conflict zone and another's entering its own", "s",
-        low=0, high=10, default=Reservation().buffer,
-    )  # fmt: skip
-    period: float = real("time between two looks", "s", low=0.01, high=10, default=0.5)
 
-    def start(self, site: Site) -> FlowSession:
-        """Begin a run; raises `InputError` for vehicles whose motion cannot be predicted."""
-        self.covers.check(self.name, site.vehicle)
-        protocol = Reservation(buffer=self.buffer, period=self.period)
-        return FlowSession(Polling(self.service == "gated"), site, protocol)
+    @property
+    def rule(self) -> Polling:
+        """Before the first vehicle."""
+        return Polling(self.service == "gated")
 
 
 @dataclass(frozen=True)

@@ -19,37 +19,27 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import takewhile
 
-from baselines.flows import FlowSession, Lines, Waiting
+from baselines.flows import Flow, Lines, Waiting
 from baselines.prediction import Floats
-from baselines.reservation import Reservation
-from minisim.control import Cover, Radio, Site
 from minisim.names import Name
-from minisim.parameters import declared, real, whole
+from minisim.parameters import declared, whole
 
 
 @declared
-class Slots:
+class Slots(Flow):
     """Slots for batches of connected vehicles (BATCH), or for one at a time (`batch=1`: FAIR)."""
 
     name = Name("slots")
-    covers = Cover(alike=True)
-    radio = Radio()
 
     batch: int = whole(
         "most vehicles that are served in another order than they came; 1 is first come, first "
         "served", low=1, high=1000, default=10,
     )  # fmt: skip
-    buffer: float = real(
-        "time between one vehicle's leaving a conflict zone and another's entering its own", "s",
-        low=0, high=10, default=Reservation().buffer,
-    )  # fmt: skip
-    period: float = real("time between two looks", "s", low=0.01, high=10, default=0.5)
 
-    def start(self, site: Site) -> FlowSession:
-        """Begin a run; raises `InputError` for vehicles whose motion cannot be predicted."""
-        self.covers.check(self.name, site.vehicle)
-        protocol = Reservation(buffer=self.buffer, period=self.period)
-        return FlowSession(Batch(self.batch), site, protocol)
+    @property
+    def rule(self) -> Batch:
+        """Before the first vehicle."""
+        return Batch(self.batch)
 
 
 @dataclass(frozen=True)

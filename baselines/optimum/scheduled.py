@@ -19,8 +19,8 @@ import numpy as np
 from baselines.optimum.alone import drives
 from baselines.optimum.planning import drivable
 from baselines.ordered import Due, OrderedSession, Times
-from baselines.reservation import Manager, Reservation, Slot
-from minisim.control import Command, Cover, Observed, Plan, Site, View
+from baselines.reservation import Manager, Slot
+from minisim.control import Command, Cover, Observed, Site, View
 from minisim.errors import InputError, integer, items, number, show
 from minisim.junction.coordination import STEP, Region, region
 from minisim.parameters import checked, declared, real
@@ -126,10 +126,8 @@ class ScheduledSession(OrderedSession):
         needs, ways = drivable(site, controller.buffer), drives(site)
         past = (needs.until - [way.before for way in ways]).tolist()
         times = Times(needs.rules.between, past, ways)
-        super().__init__(Reservation(period=controller.period), site, times)
-        self.manager = Bodies(site, controller.buffer)
-        length = site.intersection.approach_length
-        self.plan = Plan(marks=(length,), sight=length)
+        bodies, reach = Bodies(site, controller.buffer), site.intersection.approach_length
+        super().__init__(bodies, controller.period, reach, site, times)
         self._turns = controller.turns
         self._place = {(it.lane, it.rank): k for k, it in enumerate(controller.turns)}
         self._first = 0  # place of the first in the schedule that has not passed
