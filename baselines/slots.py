@@ -5,8 +5,8 @@ e0149607. Vehicles ask for a slot, the time of their access to the junction. Two
 access it one after the other keep a tailgate distance if they are of the same flow, and a stopping
 distance, which is larger, if they are not. FAIR serves them first come, first served, each at the
 earliest time. Under BATCH, the first vehicle that has none gets its slot under FAIR. Vehicles that
-could have come by then are its batch, N at most. In a batch, those of the same flow are served in a
-row, the first vehicle's flow first. A batch of one is FAIR.
+could have come by then are its batch, N with it at most. In a batch, those of the same flow are
+served in a row, the first vehicle's flow first. A batch of one is FAIR.
 
 The source has two flows of which any two vehicles are in conflict. With more, the next in a batch
 is the first vehicle of a lane that can come earliest, which is the same for two. Distances follow
@@ -50,17 +50,18 @@ class Batch:
     rest: frozenset[int] = frozenset()  #: ids of those of the batch that have not been served
 
     def choose(self, lines: Lines, free: Floats, clock: float) -> tuple[int, Batch]:  # noqa: ARG002
-        """The vehicle of the batch that can come first; of several, that which asked first."""
+        """Go on with the vehicle of the batch that can come first, or begin another batch."""
 
         def slot(it: Waiting) -> float:
             return max(it.ready, float(free[it.kind]))
 
         heads = {lane: line[0] for lane, line in enumerate(lines) if line}
-        rest = self.rest
-        if not any(it.id in rest for it in heads.values()):
-            start = slot(min(heads.values(), key=lambda it: it.request))
-            come = [it for line in lines for it in takewhile(lambda it: it.came <= start, line)]
-            rest = frozenset(it.id for it in sorted(come, key=lambda it: it.request)[: self.size])
-        batch = {lane: it for lane, it in heads.items() if it.id in rest}
-        lane = min(batch, key=lambda lane: (slot(batch[lane]), batch[lane].request))
-        return lane, Batch(self.size, rest - {batch[lane].id})
+        batch = {lane: it for lane, it in heads.items() if it.id in self.rest}
+        if batch:
+            lane = min(batch, key=lambda lane: (slot(batch[lane]), batch[lane].request))
+            return lane, Batch(self.size, self.rest - {batch[lane].id})
+        lane = min(heads, key=lambda lane: heads[lane].request)
+        start = slot(heads[lane])
+        come = [it for line in lines for it in takewhile(lambda it: it.came <= start, line)]
+        come.sort(key=lambda it: it.request)
+        return lane, Batch(self.size, frozenset(it.id for it in come[1 : self.size]))
