@@ -31,9 +31,6 @@ from minisim.parameters import declared, real
 #: Least separation of vehicles in conflict [s]: the first one comes before the second.
 LEAST = 0.01
 
-#: How far before the junction vehicles register [m]: as with V2I-C (`baselines.v2ic`).
-REACH = 200.0
-
 
 class Waiting(NamedTuple):
     """A vehicle that has not been served."""
@@ -119,6 +116,11 @@ class Flow(ABC):
     covers = Cover(alike=True)
     radio = Radio()
 
+    # As with V2I-C, since the sources leave it open (`baselines.v2ic`).
+    reach: float = real(
+        "how far before the junction, on the road, vehicles register", "m",
+        low=1, high=2000, default=200.0,
+    )  # fmt: skip
     buffer: float | None = real(
         "time between one vehicle's leaving a conflict zone and another's entering its own; none "
         "means the time in which one at the limit drives its stopping distance", "s",
@@ -146,7 +148,7 @@ class FlowSession(OrderedSession):
             limit = site.speed_limit
             buffer = stopping_distance(limit, site.vehicle.deceleration) / limit
         times = Times(separations(site, buffer), (0.0,) * len(ways), ways)
-        reach = min(REACH, site.intersection.approach_length)
+        reach = min(controller.reach, site.intersection.approach_length)
         super().__init__(Manager(site, buffer), controller.period, reach, site, times)
         self._rule = controller.rule
         self._seen: Sequence[Observed] = ()

@@ -17,7 +17,7 @@ for each other: FAIR is first come, first served by conflict zones. The source l
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import takewhile
+from itertools import islice, takewhile
 
 from baselines.flows import Flow, Lines, Waiting
 from baselines.prediction import Floats
@@ -62,6 +62,7 @@ class Batch:
             return lane, Batch(self.size, self.rest - {batch[lane].id})
         lane = min(heads, key=lambda lane: heads[lane].request)
         start = slot(heads[lane])
-        come = [it for line in lines for it in takewhile(lambda it: it.came <= start, line)]
+        lines_come = (takewhile(lambda it: it.came <= start, line) for line in lines)
+        come = [it for line in lines_come for it in islice(line, self.size)]
         come.sort(key=lambda it: it.request)
         return lane, Batch(self.size, frozenset(it.id for it in come[1 : self.size]))
