@@ -85,6 +85,10 @@ class Leaders(NamedTuple):
     b_max: Floats  #: of each [m/s²]
 
 
+#: No leaders.
+NONE = Leaders(np.empty((0, 0)), np.empty((0, 0)), *np.empty((3, 0)))
+
+
 class Motion(NamedTuple):
     """How a vehicle will drive."""
 
@@ -112,6 +116,8 @@ def predict(
 
 
 def _stacked(leaders: Sequence[Leader], bound: list[float]) -> Leaders:
+    if not leaders:
+        return NONE
     steps = max((len(leader.s) for leader in leaders), default=0)
     s, v = np.full((len(leaders), steps), np.inf), np.zeros((len(leaders), steps))
     for j, leader in enumerate(leaders):

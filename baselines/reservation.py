@@ -175,6 +175,12 @@ class Manager:
         }
         return Slot(seen.id, seen.lane, me, p, now, s, v, enters, zones, hard)
 
+    def alone(self, me: Observed, now: int, mark: float) -> int:
+        """When a vehicle would be at a place past the entry [m] if it drove on alone [steps]."""
+        way = self._ways[self._rows[me.lane][me.manoeuvre]]._replace(end=mark)
+        run = predict(self._law, self._types[me.type], way, -me.distance, me.speed)
+        return now + (len(run.s) if run is not None else 0)
+
     def fits(self, slot: Slot, *, last: bool) -> bool:
         """Whether a passage fits every other; the `last` comes after all in its exit lane."""
         if slot.hard:

@@ -27,7 +27,9 @@ from baselines import (
     AllWayStop,
     FixedTime,
     LongestQueue,
+    Platoons,
     Reservation,
+    Slots,
     V2ICAsRun,
 )
 from dim import AsRunDim, Dim
@@ -88,6 +90,14 @@ CONTROLLERS: Mapping[str, Entry] = MappingProxyType({
         Entry("reservation", Reservation, _rival(Look("reservation", "purple", "v", "-."))),
         Entry("longest-queue", LongestQueue, (
             Variant("", Look("longest queue first", "brown", "<", ":"), rival=True),
+        )),
+        Entry("slots", Slots, (
+            Variant("", Look("slots for batches", "orange", "d", "-")),
+            Variant("batch=1", Look("slots, first come first served", "orange", "x", ":")),
+        )),
+        Entry("platoons", Platoons, (
+            Variant("", Look("platoons, exhaustive", "ink", "1", "-")),
+            Variant("service=gated", Look("platoons, gated", "ink", "2", "-.")),
         )),
         Entry("actuated", Actuated),
         Entry("dim-as-run", AsRunDim),

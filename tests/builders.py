@@ -20,6 +20,7 @@ import numpy as np
 import pandas as pd
 from hypothesis import settings
 
+from baselines.flows import Rule, Waiting, plan
 from dim import Dim, NoisyPerception
 from dim.perception import See
 from minisim.arrivals import Arrivals
@@ -249,6 +250,26 @@ class Reading:
         return lambda view, ego: view._replace(
             vehicles=tuple(v._replace(manoeuvre=self.read(view, ego, v)) for v in view.vehicles)
         )
+
+
+def queued(rule: Rule, lanes: int, rate: float, clearance: float, seeds: range) -> list[float]:
+    """How long vehicles wait that need 1 s each, and `clearance` more after another lane [s].
+
+    5000 for each seed, as a Poisson process of this rate [1/s], and as many of each lane.
+    """
+    between = 1.0 + clearance * (1.0 - np.eye(lanes))
+    waits: list[float] = []
+    for seed in seeds:
+        random = np.random.default_rng(seed)
+        time = random.exponential(size=5000).cumsum()
+        time *= len(time) / rate / time[-1]
+        lane = random.permutation(np.arange(len(time)) % lanes)
+        lines: list[list[Waiting]] = [[] for _ in range(lanes)]
+        for i, (t, k) in enumerate(zip(time.tolist(), lane.tolist(), strict=True)):
+            lines[k].append(Waiting(i, k, i, t, t))
+        served = plan(lines, rule, between, np.full(lanes, -math.inf), -math.inf)
+        waits += [it.time - it.vehicle.came for it in served]
+    return waits
 
 
 def said(commands: Iterable[Command]) -> list[str]:

@@ -1,19 +1,16 @@
 """A controller that lets vehicles pass in a given order, as near to its times as their law allows.
 
 It knows the order of all vehicles of a run beforehand, so it is no rival. It shows how near to the
-bound vehicles can be driven. A vehicle gets the right of way when all that are before it in the
-order and conflict with it have theirs, and its passage, predicted by its law, fits theirs. Until
-then it drives as slowly as makes it come in time, so that it crosses at full speed.
+bound vehicles can be driven (`baselines.ordered`).
 
-It keeps the protocol of `baselines.reservation`, with two differences. Passages fit if the bodies
-keep a clearance (`minisim.junction.coordination`) at any two moments up to `buffer` apart. And
-vehicles enter a shared exit lane in the order of the schedule.
+From the protocol of `baselines.reservation` it differs in two ways. Passages fit if the bodies keep
+a clearance (`minisim.junction.coordination`) at any two moments up to `buffer` apart. And vehicles
+enter a shared exit lane in the order of the schedule.
 """
 
 from __future__ import annotations
 
 import hashlib
-import math
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
 
@@ -21,9 +18,9 @@ import numpy as np
 
 from baselines.optimum.alone import drives
 from baselines.optimum.planning import drivable
-from baselines.prediction import predict
-from baselines.reservation import Manager, Reservation, ReservationSession, Slot
-from minisim.control import Advise, Command, Cover, Observed, Plan, Site, View
+from baselines.ordered import Due, OrderedSession, Times
+from baselines.reservation import Manager, Slot
+from minisim.control import Command, Cover, Observed, Site, View
 from minisim.errors import InputError, integer, items, number, show
 from minisim.junction.coordination import STEP, Region, region
 from minisim.parameters import checked, declared, real
@@ -34,14 +31,6 @@ BUFFER = 0.2
 
 #: Bodies are compared at moments so far apart [s].
 MOMENT = 0.025
-
-#: Slowest advice [m/s], and how fast a vehicle accelerates on its way to the junction, as a share
-#: of what it can: the law accelerates less the nearer it is to the limit.
-SLOWEST, SHARE = 2.0, 0.6
-
-#: A vehicle that is so much early is not considered yet [s]; one whose passage does not fit yet
-#: counts as so much later.
-EARLY, AGAIN = 1.0, 0.3
 
 
 class Turn(NamedTuple):
@@ -97,12 +86,6 @@ class Bodies(Manager):
         self._number = {it: k for k, it in enumerate(self._types)}
         self._conflicts = site.conflicts
 
-    def alone(self, me: Observed, now: int, mark: float) -> float:
-        """When a vehicle would be at a place past the entry [m] if it drove on alone [steps]."""
-        way = self._ways[self._rows[me.lane][me.manoeuvre]]
-        run = predict(self._law, self._types[me.type], way, -me.distance, me.speed)
-        return math.inf if run is None else now + int(run.s.searchsorted(mark))
-
     def fits(self, slot: Slot, *, last: bool) -> bool:  # noqa: ARG002  (Manager's argument)
         """Whether a passage fits every other."""
         return not slot.hard and all(
@@ -134,102 +117,45 @@ class Bodies(Manager):
         )
 
 
-class ScheduledSession(ReservationSession):
-    """One run: grants passages in the order of the schedule, and slows the others down in time."""
+class ScheduledSession(OrderedSession):
+    """One run, in the order of the schedule."""
 
     manager: Bodies
 
     def __init__(self, controller: Scheduled, site: Site) -> None:
-        super().__init__(Reservation(period=controller.period), site)
-        self.manager = Bodies(site, controller.buffer)
-        length = site.intersection.approach_length
-        self.plan = Plan(marks=(length,), sight=length)
+        needs, ways = drivable(site, controller.buffer), drives(site)
+        past = (needs.until - [way.before for way in ways]).tolist()
+        times = Times(needs.rules.between, past, ways)
+        bodies, reach = Bodies(site, controller.buffer), site.intersection.approach_length
+        super().__init__(bodies, controller.period, reach, site, times)
         self._turns = controller.turns
         self._place = {(it.lane, it.rank): k for k, it in enumerate(controller.turns)}
         self._first = 0  # place of the first in the schedule that has not passed
         self._newest: dict[int, int] = {}  # highest rank seen by lane
         self._seen: Mapping[tuple[int, int], Observed] = {}
-        self._advice: list[Command] = []
-        needs, ways = drivable(site, controller.buffer), drives(site)
-        self._between, self._drives = needs.rules.between, ways
-        at_mark = needs.until - [way.before for way in ways]
-        self._past = at_mark.tolist()  # least time from the entry to the mark [s]
-        self._marks = [way.place(t) for way, t in zip(ways, self._past, strict=True)]
-        movements, types = site.intersection.movements, len(site.types)
-        self._conflict = np.tile(site.conflicts | ~movements.apart, (types, types))
-        self._limit, self._types = site.limit, site.types
 
     def decide(self, view: View) -> Iterable[Command]:
-        """Check the passages, grant new ones in order, and advise the others."""
+        """Note which vehicles have come, and decide in the order of the schedule."""
         self._seen = {(it.lane, it.rank): it for it in view.vehicles}
-        self._advice = []
         for it in view.vehicles:
             self.manager.place[it.id] = self._place[it.lane, it.rank]
             self._newest[it.lane] = max(self._newest.get(it.lane, -1), it.rank)
-        return [*super().decide(view), *self._advice]
+        return super().decide(view)
 
-    def _grant(self, seen: dict[int, Observed], ahead: dict[int, int], now: int) -> Iterator[int]:
-        """Grant passages in the order of the schedule; return the ids of the new holders."""
-        free, blocked = np.full(len(self._between), -math.inf), np.zeros(len(self._between), bool)
-        left = len(seen)
+    def _order(self, now: int) -> Iterator[Due]:  # noqa: ARG002
+        """Those that have not passed, up to the last one in view."""
+        left = len(self._seen)
         while self._first < len(self._turns) and self._passed(self._turns[self._first]):
             self._first += 1
-        for turn in self._turns[self._first :]:
+        for it in self._turns[self._first :]:
             if not left:
                 break
-            if self._passed(turn):
-                continue
-            me, time, held = self._seen.get((turn.lane, turn.rank)), turn.time, True
-            if me is not None:
-                left -= 1
-                slot = self.manager.slots.get(me.id)
-                held = slot is None
-                if slot is None:
-                    alone = self.manager.alone(me, now, self._marks[turn.kind]) * self._dt
-                    time = max(alone, float(free[turn.kind]))
-                    if not blocked[turn.kind] and time - alone < EARLY:
-                        slot = self._passage(me, now, ahead.get(me.id))
-                        time = max(time, alone + AGAIN)
-                if slot is not None:
-                    time = self._at_mark(slot, turn.kind)
-                    if held:
-                        yield me.id
-                        self._advice.append(Advise(me.id, math.inf))
-                    held = False
-                else:
-                    speed = self._speed(me, turn.kind, time - now * self._dt)
-                    self._advice.append(Advise(me.id, speed))
-            if held:
-                blocked |= self._conflict[turn.kind]
-            free = np.maximum(free, time + self._between[turn.kind])
+            if not self._passed(it):
+                me = self._seen.get((it.lane, it.rank))
+                left -= me is not None
+                yield Due(it.kind, me, it.time)
 
-    def _passed(self, turn: Turn) -> bool:
+    def _passed(self, it: Turn) -> bool:
         """Whether a vehicle has been in view and is no more."""
-        place = turn.lane, turn.rank
-        return place not in self._seen and self._newest.get(turn.lane, -1) >= turn.rank
-
-    def _passage(self, me: Observed, now: int, leader: int | None) -> Slot | None:
-        """A vehicle's passage if it fits all others; then it holds it."""
-        slot = self._predict(me, now, leader)
-        if slot is None or not self.manager.fits(slot, last=True):
-            return None
-        self.manager.slots[me.id] = slot
-        self._requests.pop(me.id, None)
-        return slot
-
-    def _at_mark(self, slot: Slot, kind: int) -> float:
-        return (slot.start + int(slot.s.searchsorted(self._marks[kind]))) * self._dt
-
-    def _speed(self, me: Observed, kind: int, left: float) -> float:
-        """The speed at which a vehicle passes its mark in the time that is left [m/s].
-
-        It drives at this speed until it has to accelerate or brake for the speed at the entry.
-        """
-        it, limit, u = self._types[me.type], self._limit(me.lane), me.speed
-        final = float(self._drives[kind].speed(0.0))
-        for _ in range(3):  # the speed depends on where that is, and the other way round
-            a = it.acceleration * SHARE if u < final else it.deceleration
-            run_up = min(abs(final * final - u * u) / (2.0 * a), max(me.distance - 1.0, 0.0))
-            rest = 2.0 * run_up / max(u + final, 2.0) + self._past[kind]
-            u = min(max((me.distance - run_up) / max(left - rest, 0.1), SLOWEST), limit)
-        return u if u < limit else math.inf
+        place = it.lane, it.rank
+        return place not in self._seen and self._newest.get(it.lane, -1) >= it.rank

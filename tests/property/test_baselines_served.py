@@ -11,7 +11,17 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 import minisim
-from baselines import V2IC, Actuated, Adaptive, AllWayStop, FixedTime, LongestQueue, Reservation
+from baselines import (
+    V2IC,
+    Actuated,
+    Adaptive,
+    AllWayStop,
+    FixedTime,
+    LongestQueue,
+    Platoons,
+    Reservation,
+    Slots,
+)
 from minisim.control import Controller, Site, cover_of
 from minisim.errors import InputError
 from minisim.junction.conflicts import CLEARANCE, conflict_zones, entry_room
@@ -28,6 +38,8 @@ from tests.builders import Greens, drained, queues, replayed, share
 #: None at all, less than a step, and no whole number of steps among them [s].
 AMBERS = st.sampled_from([0.0, 0.04, 2.0, 3.03])
 GREENS = {"min_green": floats(0.5, 10.0), "max_green": floats(10.0, 50.0), "amber": AMBERS}
+
+BUFFERS = st.none() | floats(0.5, 2.0)
 
 #: From detectors just before the line to ones beyond short roads, from short to long greens.
 RIVALS: dict[str, st.SearchStrategy[Controller]] = {
@@ -49,10 +61,12 @@ RIVALS: dict[str, st.SearchStrategy[Controller]] = {
     "all-way-stop": st.builds(AllWayStop, reaction=st.just(0.0) | floats(0.0, 3.0)),
     "v2ic": st.sampled_from([V2IC(), V2IC(reach=60.0, period=0.2)]),
     "reservation": st.sampled_from([Reservation(), Reservation(reach=100.0, period=0.2)]),
+    "flows": st.builds(Slots, batch=st.integers(1, 12), buffer=BUFFERS, reach=floats(40.0, 300.0))
+    | st.builds(Platoons, service=st.sampled_from(["exhaustive", "gated"]), buffer=BUFFERS),
 }  # fmt: skip
 
 #: These keep bodies apart in time, by their predictions; the others never share a conflict area.
-PREDICTING = ("v2ic", "reservation")
+PREDICTING = ("v2ic", "reservation", "flows")
 
 
 @st.composite

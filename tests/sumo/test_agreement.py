@@ -17,7 +17,7 @@ from scenarios.controllers import controller_named
 
 CONTROLLERS = (
     "dim", "dim:gate=harmonious", "fixed-time", "adaptive", "all-way-stop", "longest-queue", "v2ic",
-    "reservation",
+    "reservation", "slots",
 )  # fmt: skip
 DENSITIES = (150.0, 200.0, 250.0, 300.0, 350.0)
 MEASURES = ("waiting_time_s", "travel_time_s")

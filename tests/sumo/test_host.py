@@ -21,7 +21,17 @@ import pytest
 from hypothesis import given
 
 import minisim
-from baselines import V2IC, Actuated, Adaptive, AllWayStop, FixedTime, LongestQueue, Reservation
+from baselines import (
+    V2IC,
+    Actuated,
+    Adaptive,
+    AllWayStop,
+    FixedTime,
+    LongestQueue,
+    Platoons,
+    Reservation,
+    Slots,
+)
 from dim import Dim, Mixed, NoisyPerception
 from minisim.control import (
     Advise,
@@ -78,7 +88,8 @@ def furthest_apart(first: Run, second: Run, vehicle: int = 0) -> tuple[float, fl
 
 CONTROLLERS: tuple[Controller, ...] = (
     Dim(), Dim(gate="harmonious"), FixedTime(), Adaptive(), AllWayStop(), LongestQueue(),
-    V2IC(), Reservation(), Mixed(share=0.5), Mixed(Dim(gate="harmonious"), 1.0),
+    V2IC(), Reservation(), Slots(), Platoons(service="gated"),
+    Mixed(share=0.5), Mixed(Dim(gate="harmonious"), 1.0),
 )  # fmt: skip
 
 
