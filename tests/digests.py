@@ -42,14 +42,14 @@ RULES = (
     "dim:perception=noisy(intent_error=0.15,kind=symmetric)",
     "dim:perception=noisy(unsignalled=(0.29,0.25))", "dim:perception=noisy(occlusion=true)",
     "fixed-time", "fixed-time:equal_greens=true", "adaptive", "actuated", "all-way-stop",
-    "longest-queue", "v2ic", "reservation", "unregulated",
+    "max-pressure", "v2ic", "reservation", "unregulated",
 )  # fmt: skip
 AS_RUN = (
     "dim", "dim-as-run", "dim-as-run:order=size", "dim-as-run:exit_speed=14", "v2ic-as-run",
-    "v2ic-as-run:approach_speed=14", "v2ic", "fixed-time", "adaptive", "actuated", "longest-queue",
+    "v2ic-as-run:approach_speed=14", "v2ic", "fixed-time", "adaptive", "actuated", "max-pressure",
     "all-way-stop",
 )  # fmt: skip
-SIGNALS = ("fixed-time", "adaptive", "actuated", "longest-queue", "dim", "v2ic")
+SIGNALS = ("fixed-time", "adaptive", "actuated", "max-pressure", "dim", "v2ic")
 SOME = (
     "dim", "dim:gate=harmonious", "fixed-time", "adaptive", "all-way-stop", "v2ic", "reservation",
     "dim:monitor=on",

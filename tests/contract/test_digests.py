@@ -20,7 +20,7 @@ KEPT = {
     "paper/4/fixed-time/1": "2ecea1096805f85d",
     "fair/4/adaptive/2": "abc0c33341f21f73",
     "fair/3/actuated/1": "effec0198d6afa5c",
-    "fair/4/longest-queue/1": "75fec4a79f90e06c",
+    "fair/4/max-pressure/1": "75fec4a79f90e06c",
     "paper/4/all-way-stop/1": "f1aaaa3887c49665",
     "fair/4/v2ic/1": "08e72b0a24bc7928",
     "fair/5/reservation/2": "2d1ce58f6f1556e6",

@@ -11,7 +11,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 import minisim
-from baselines import V2IC, Actuated, Adaptive, AllWayStop, FixedTime, LongestQueue, Reservation
+from baselines import V2IC, Actuated, Adaptive, AllWayStop, FixedTime, MaxPressure, Reservation
 from minisim.control import Controller, Site, cover_of
 from minisim.errors import InputError
 from minisim.junction.conflicts import CLEARANCE, conflict_zones, entry_room
@@ -43,8 +43,8 @@ RIVALS: dict[str, st.SearchStrategy[Controller]] = {
         Actuated, max_gap=floats(0.0, 10.0), detector_gap=floats(0.1, 20.0),
         passing_time=floats(0.1, 5.0), presence=st.booleans(), **GREENS,
     ),
-    "longest-queue": st.builds(
-        LongestQueue, interval=floats(0.5, 15.0), detector_range=floats(15.0, 200.0), amber=AMBERS
+    "max-pressure": st.builds(
+        MaxPressure, interval=floats(0.5, 15.0), detector_range=floats(15.0, 200.0), amber=AMBERS
     ),
     "all-way-stop": st.builds(AllWayStop, reaction=st.just(0.0) | floats(0.0, 3.0)),
     "v2ic": st.sampled_from([V2IC(), V2IC(reach=60.0, period=0.2)]),

@@ -21,7 +21,7 @@ import pytest
 from hypothesis import given
 
 import minisim
-from baselines import V2IC, Actuated, Adaptive, AllWayStop, FixedTime, LongestQueue, Reservation
+from baselines import V2IC, Actuated, Adaptive, AllWayStop, FixedTime, MaxPressure, Reservation
 from dim import Dim, Mixed, NoisyPerception
 from minisim.control import (
     Advise,
@@ -77,7 +77,7 @@ def furthest_apart(first: Run, second: Run, vehicle: int = 0) -> tuple[float, fl
 
 
 CONTROLLERS: tuple[Controller, ...] = (
-    Dim(), Dim(gate="harmonious"), FixedTime(), Adaptive(), AllWayStop(), LongestQueue(),
+    Dim(), Dim(gate="harmonious"), FixedTime(), Adaptive(), AllWayStop(), MaxPressure(),
     V2IC(), Reservation(), Mixed(share=0.5), Mixed(Dim(gate="harmonious"), 1.0),
 )  # fmt: skip
 
