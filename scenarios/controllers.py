@@ -83,7 +83,7 @@ CONTROLLERS: Mapping[str, Entry] = MappingProxyType({
         ), as_run="dim-as-run"),
         Entry("fixed-time", FixedTime, (
             Variant("", Look("fixed-time signal", "vermillion", "s", "--"), rival=True),
-            Variant("facing=on", Look("two-phase signal", "vermillion", "d", ":"), rival=True),
+            Variant("facing=true", Look("two-phase signal", "vermillion", "d", ":"), rival=True),
         )),
         Entry("adaptive", Adaptive, _rival(Look("adaptive signal", "orange", "^", "-."))),
         Entry("v2ic", V2IC, _rival(Look("V2I-C", "green", "D", ":")), as_run="v2ic-as-run"),
@@ -91,7 +91,7 @@ CONTROLLERS: Mapping[str, Entry] = MappingProxyType({
         Entry("reservation", Reservation, _rival(Look("reservation", "purple", "v", "-."))),
         Entry("max-pressure", MaxPressure, (
             Variant("", Look("max-pressure", "brown", "<", ":"), rival=True),
-            Variant("facing=on", Look("two-phase max-pressure", "brown", "h", "--")),
+            Variant("facing=true", Look("two-phase max-pressure", "brown", "h", "--")),
         )),
         Entry("actuated", Actuated),
         Entry("dim-as-run", AsRunDim),

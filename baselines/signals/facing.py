@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from baselines.signals.heads import Colour, Heads, committed, full_order
+from baselines.signals.heads import SIGHT_MARGIN, Colour, Heads, committed, full_order
 from minisim.control import (
     HALTING,
     LATERAL_ACCELERATION,
@@ -35,6 +35,7 @@ from minisim.control import (
     Observed,
     Site,
     View,
+    stopping_distance,
 )
 from minisim.junction.conflicts import conflict_zones
 from minisim.junction.geometry import Intersection
@@ -81,8 +82,8 @@ def phases_of(
     unless `order` lists every lane once.
     """
     lanes = full_order(order, intersection)
-    phases = facing(intersection)
-    return list(dict.fromkeys(phases[lane] if together else (lane,) for lane in lanes))
+    phases = facing(intersection) if together else {lane: (lane,) for lane in lanes}
+    return list(dict.fromkeys(phases[lane] for lane in lanes))
 
 
 def facing_switch() -> Any:
@@ -102,6 +103,7 @@ class _Type(NamedTuple):
 
     zones: list[list[list[float]]]  # conflict zones of its movements, see `conflict_zones`
     acceleration: float  # [m/s²]
+    deceleration: float  # [m/s²]
 
 
 class FacingHeads(Heads):
@@ -131,7 +133,11 @@ class FacingHeads(Heads):
         #: Whether a movement may have to wait for a gap.
         self._waits = (conflicts & partners & (turns_more > -ALIKE)).any(axis=1).tolist()
         self._types = [
-            _Type(conflict_zones(intersection, it, site.fleet).tolist(), it.acceleration)
+            _Type(
+                conflict_zones(intersection, it, site.fleet).tolist(),
+                it.acceleration,
+                it.deceleration,
+            )
             for it in site.types
         ]
         self._caps = [
@@ -145,9 +151,7 @@ class FacingHeads(Heads):
         self._sneakers: dict[int, int] = {}  # lane: vehicle that may still go
         self._went = [-math.inf] * intersection.n  # when the last one that waited for a gap went
         self.marks = (self.sight,)
-        self.sight = min(
-            max(self.sight, CRITICAL_GAP * site.speed_limit), intersection.approach_length
-        )
+        self.sight = min(self.sight + CRITICAL_GAP * site.speed_limit, intersection.approach_length)
 
     def show(self, view: View, wanted: Sequence[Colour]) -> list[Command]:
         """Turn the heads, then let vehicles go and hold others."""
@@ -201,6 +205,9 @@ class FacingHeads(Heads):
         first = next((v for v in lanes[lane] if v.id not in self._let_go and v.distance >= 0), None)
         if first is None or not self._waits[self._way(first)]:
             return None
+        b, speed = self._types[first.type].deceleration, first.speed
+        if first.distance > stopping_distance(speed, b) + speed * self._look + SIGHT_MARGIN:
+            return None  # it need not decide yet, and will see more of those that come
         green = self.colours[lane] is Colour.GREEN
         return first if green or self._sneakers.get(lane) == first.id else None
 
@@ -231,7 +238,7 @@ class FacingHeads(Heads):
         return followed and gap >= CRITICAL_GAP and soonest >= clear
 
     def _oncoming(self, lane: int, lanes: Lanes) -> Iterator[Observed]:
-        """The vehicles on the facing lanes that have gone or come; not those behind one that waits."""
+        """The vehicles on the facing lanes that have gone or come, not those behind one held."""
         for other in self._partners[lane]:
             comes = self.colours[other] is Colour.GREEN
             for v in lanes.get(other, ()):
@@ -265,9 +272,10 @@ class FacingHeads(Heads):
         """Whether a vehicle, at its present speed, is out of another's way before that one comes.
 
         It counts as no faster than its turn and its exit allow, and than any vehicle ahead of it.
+        A vehicle for the same exit follows only when it has left, or would brake hard behind it.
         """
-        way = self._way(turning)
-        _, leave = self._zone(turning, self._way(other))
+        way, its = self._way(turning), self._way(other)
+        _, leave = self._zone(turning, its)
         left = turning.distance + leave
         if left <= 0.0:
             return True
@@ -280,7 +288,8 @@ class FacingHeads(Heads):
         ]
         pace = min([turning.speed, self._caps[way], *ahead])
         enter, _ = self._zone(other, way)
-        return pace > 0.0 and left / pace <= self._arrival(other, enter)
+        apart = self._exits[way] != self._exits[its]
+        return apart and pace > 0.0 and left / pace <= self._arrival(other, enter)
 
     def _arrival(self, vehicle: Observed, place: float) -> float:
         """Time until a vehicle can be `place` m past its entry, at full acceleration [s]."""
@@ -297,7 +306,7 @@ class FacingHeads(Heads):
 
 
 def travel_time(distance: float, speed: float, acceleration: float, cap: float) -> float:
-    """Least time for a distance [m]: full acceleration [m/s²] up to `cap` [m/s] from `speed` [s]."""
+    """Least time for a distance [m], from `speed` at full acceleration up to `cap` [m/s]; in s."""
     if distance <= 0.0:
         return 0.0
     speeding_up = max(cap - speed, 0.0) / acceleration
