@@ -9,8 +9,9 @@ from itertools import accumulate, count, pairwise
 from numbers import Real
 from typing import Any
 
-from baselines.signals.facing import FacingHeads, facing_switch, phases_of
+from baselines.signals.facing import facing_switch, phases_of
 from baselines.signals.heads import Colour, Heads, lane_order
+from baselines.signals.permitted import PermittedHeads
 from baselines.signals.webster import MIN_GREEN, SignalTiming, timing_of, webster
 from minisim.control import Command, Plan, Site, View, Wake
 from minisim.errors import InputError, number, numbers, plural
@@ -117,7 +118,7 @@ class FixedTime:
     def start(self, site: Site) -> FixedTimeSession:
         """Begin a run; raises `InputError` as `timing` does."""
         programs = [self._program(timing.greens, site) for timing in self.timings(site)]
-        heads = FacingHeads(site, self.name) if self.facing else Heads(site)
+        heads = PermittedHeads(site, self.name) if self.facing else Heads(site)
         return FixedTimeSession(site, heads, Programs(programs, self.plans or math.inf))
 
     def phases(self, site: Site) -> list[tuple[int, ...]]:

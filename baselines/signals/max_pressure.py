@@ -13,7 +13,8 @@ from __future__ import annotations
 import math
 from collections import Counter
 
-from baselines.signals.facing import FacingHeads, facing_switch
+from baselines.signals.facing import facing_switch
+from baselines.signals.permitted import PermittedHeads
 from baselines.signals.phases import PhaseSession, Verdict, on_detector
 from minisim.control import Site, View
 from minisim.names import Name
@@ -58,7 +59,7 @@ class PressureSession(PhaseSession):
     def __init__(self, signal: MaxPressure, site: Site) -> None:
         super().__init__(
             site, signal.detector_range, signal.interval, signal.amber,
-            facing=FacingHeads(site, signal.name) if signal.facing else None,
+            facing=PermittedHeads(site, signal.name) if signal.facing else None,
         )  # fmt: skip
         self._signal = signal
         self._last_green = [-math.inf] * site.intersection.n  # [s]

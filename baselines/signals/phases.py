@@ -10,8 +10,9 @@ import math
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from baselines.signals.facing import FacingHeads, phases_of
+from baselines.signals.facing import phases_of
 from baselines.signals.heads import Colour, Heads
+from baselines.signals.permitted import PermittedHeads
 from minisim.control import Command, Observed, Plan, Site, View, Wake
 from minisim.errors import InputError, number
 
@@ -59,7 +60,7 @@ class PhaseSession:
     def __init__(
         self, site: Site, detector_range: float, min_green: float, amber: float,
         marks: tuple[float, ...] = (), order: tuple[int, ...] | None = None,
-        facing: FacingHeads | None = None,
+        facing: PermittedHeads | None = None,
     ) -> None:  # fmt: skip
         road = site.intersection.approach_length
         heads = self._heads = facing or Heads(site)
