@@ -83,7 +83,7 @@ CONTROLLERS: Mapping[str, Entry] = MappingProxyType({
         ), as_run="dim-as-run"),
         Entry("fixed-time", FixedTime, (
             Variant("", Look("fixed-time signal", "vermillion", "s", "--"), rival=True),
-            Variant("facing=true", Look("two-phase signal", "vermillion", "d", ":"), rival=True),
+            Variant("facing=true", Look("two-phase signal", "vermillion", "d", ":")),
         )),
         Entry("adaptive", Adaptive, _rival(Look("adaptive signal", "orange", "^", "-."))),
         Entry("v2ic", V2IC, _rival(Look("V2I-C", "green", "D", ":")), as_run="v2ic-as-run"),

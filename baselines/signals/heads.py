@@ -64,7 +64,7 @@ class Heads:
         self._crossed = crossed.tolist()  # lane, then movement
         self._exclusive = [[bool(row[way].any()) for way in ways] for row in crossed]  # by lanes
         brakes, dt = [it.deceleration for it in site.types], site.dt
-        self._stops = lambda v: can_stop(v, brakes[v.type])
+        self._stops: Callable[[Observed], bool] = lambda v: can_stop(v, brakes[v.type])
         self._goes = [Colour.GREEN]
         if isinstance(site.vehicle, CruiseVehicle) and site.vehicle.obeys:
             self._goes += [Colour.AMBER]

@@ -1,11 +1,11 @@
-"""Longest queue first: which is next, ties, and why no two approaches are green together."""
+"""Max-pressure: which phase is next, ties, and that it serves every demand that fits."""
 
 from __future__ import annotations
 
 import pytest
 
 import minisim
-from baselines import MaxPressure
+from baselines import FixedTime, MaxPressure
 from baselines.signals.max_pressure import PressureSession
 from minisim.control import Observed, View
 from scenarios.library import four_way, regular
@@ -77,6 +77,12 @@ def test_the_interval_runs_from_the_green_that_is_shown() -> None:
     assert show(session, 13.5, *d) == ["Close 2"]
 
 
+def test_queues_of_approaches_that_face_each_other_are_added() -> None:
+    session = PressureSession(MaxPressure(facing=True), SITE)
+    for lengths, first in (((5, 3, 0, 3), 1), ((5, 3, 2, 3), 0), ((0, 1, 0, 0), 1)):
+        assert session.judge(View(10.0, tuple(queues(*lengths))), 0, 10.0).lane == first
+
+
 @pytest.mark.parametrize("n", [3, 4, 5, 6])
 def test_no_two_approaches_could_be_green_together(n: int) -> None:
     """Why a phase is one approach: a lane that carries all turns conflicts with every other."""
@@ -93,3 +99,31 @@ def test_the_busier_lanes_get_more_green() -> None:
     held = frame[~frame["right_of_way"] & (frame["s_m"] < run.site.intersection.approach_length)]
     share = held.groupby("lane").size() / frame.groupby("lane").size()
     assert max(share["a"], share["b"]) < min(share["c"], share["d"])
+
+
+@pytest.mark.parametrize("facing", [False, True])
+@pytest.mark.parametrize("split", [(1, 1, 1, 1), (4, 4, 1, 1), (8, 1, 1, 1)])
+def test_it_serves_every_demand_that_fits(split: tuple[int, ...], facing: bool) -> None:
+    """Varaiya 2013, theorem 2: queues stay bounded if any signal could serve the demand.
+
+    In all, 1080 veh/h fit here. Greens that know as little of the demand, all alike, let the queues
+    of uneven demand grow.
+    """
+    scenario = four_way(270, split=split, profile="fair", horizon=3600.0)
+    grown, alike = (
+        minisim.simulate(scenario, signal, 1).summary(["queue_growth"])["queue_growth"]
+        for signal in (MaxPressure(facing=facing), FixedTime(equal_greens=True))
+    )
+    assert grown < 8.0
+    assert (alike > 50.0) is (max(split) > 1)
+
+
+def test_what_dim_sees_is_too_little_for_that() -> None:
+    """At 8 m it sees whether any wait, not how many, and a lane of few vehicles gets too much."""
+    scenario = four_way(300, split=(8, 1, 1, 1), profile="fair", horizon=3600.0)
+    near, far = (
+        minisim.simulate(scenario, signal, 1).summary(["queue_growth"])["queue_growth"]
+        for signal in (MaxPressure(detector_range=8.0), MaxPressure())
+    )
+    assert far < 8.0
+    assert near > 50.0

@@ -22,7 +22,7 @@ SITE = four_way(profile="fair").site()  # left-hand traffic: a3 is a far turn, a
 RED, AMBER, GREEN = Colour.RED, Colour.AMBER, Colour.GREEN
 ALONG, ACROSS, ALL_RED = (GREEN, RED, GREEN, RED), (RED, GREEN, RED, GREEN), (RED,) * 4
 
-#: Waiting at the line, and 63 m before the conflict zone of c2 with a3, which begins 5 m inside.
+#: Standing at the line.
 waiting = partial(car, distance=0.25)
 LIMIT = 14.0
 
@@ -53,10 +53,10 @@ def test_a_far_turn_goes_if_none_comes_or_all_turn_likewise() -> None:
 
 @pytest.mark.parametrize("gap", [CRITICAL_GAP - 0.1, CRITICAL_GAP + 0.1])
 def test_a_far_turn_takes_the_critical_gap(gap: float) -> None:
+    """The conflict zone of c2 with a3 begins 5 m inside the junction."""
     coming = car(2, "c2", gap * LIMIT - 5.0, LIMIT)
-    assert told(heads(), waiting(1, "a3"), coming) == (
-        ["Go 1", "Hold 2"][:1] if gap > CRITICAL_GAP else ["Go 2"]
-    )
+    taken = gap > CRITICAL_GAP
+    assert told(heads(), waiting(1, "a3"), coming) == (["Go 1"] if taken else ["Go 2"])
 
 
 def test_a_vehicle_that_is_just_past_begins_the_gap() -> None:
@@ -117,7 +117,7 @@ def test_a_vehicle_for_the_same_exit_follows_when_the_turning_one_has_left() -> 
     assert told(it, car(2, "c1", 29.0, LIMIT)) == ["Go 2"]
 
 
-def test_at_the_end_of_green_who_waits_at_the_line_still_goes_before_the_others() -> None:
+def test_at_the_end_of_green_what_waits_at_the_line_still_goes_before_the_others() -> None:
     it = heads()
     close = car(2, "c2", 5.0, LIMIT)
     assert told(it, waiting(1, "a3"), close, car(3, "a2", 7.75), car(4, "b2", 0.25)) == ["Go 2"]
@@ -129,7 +129,7 @@ def test_at_the_end_of_green_who_waits_at_the_line_still_goes_before_the_others(
     assert told(it, car(4, "b2", 0.25), wanted=ACROSS) == ["Go 4"]
 
 
-def test_at_the_end_of_green_those_who_can_stop_are_held() -> None:
+def test_at_the_end_of_green_vehicles_that_can_stop_are_held() -> None:
     it = heads()
     told(it, car(1, "a2", 20.0, LIMIT), car(2, "a2", 40.0, LIMIT), car(3, "c3", 30.0, LIMIT))
     assert told(it, car(1, "a2", 18.0, LIMIT), car(2, "a2", 38.0, LIMIT), wanted=ALL_RED) == [
