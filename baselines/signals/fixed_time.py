@@ -37,6 +37,7 @@ class FixedTime:
     """
 
     name = Name("fixed-time")
+    lights = True
 
     greens: Takes[tuple[float, ...] | float | None, Iterable[float] | float | None] = checked(
         "green of each lane, or one number for all; none means Webster's for the expected demand",

@@ -32,6 +32,7 @@ class MaxPressure:
     """
 
     name = Name("max-pressure")
+    lights = True
 
     # 5–10 s are usual; the code of Genders & Razavi (arXiv 1909.00395) has 5 s for roads of
     # several lanes. A change costs some 3 s, so single lanes need the upper end.
