@@ -6,7 +6,7 @@ from baselines.reservation import Reservation
 from baselines.signals.actuated import Actuated
 from baselines.signals.adaptive import Adaptive
 from baselines.signals.fixed_time import FixedTime
-from baselines.signals.longest_queue import LongestQueue
+from baselines.signals.max_pressure import MaxPressure
 from baselines.signals.webster import SignalTiming, webster, webster_delay
 from baselines.slots import Slots
 from baselines.v2ic import V2IC
@@ -18,7 +18,7 @@ __all__ = [
     "Adaptive",
     "AllWayStop",
     "FixedTime",
-    "LongestQueue",
+    "MaxPressure",
     "Platoons",
     "Reservation",
     "SignalTiming",

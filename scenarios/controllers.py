@@ -26,7 +26,7 @@ from baselines import (
     Adaptive,
     AllWayStop,
     FixedTime,
-    LongestQueue,
+    MaxPressure,
     Platoons,
     Reservation,
     Slots,
@@ -83,13 +83,17 @@ CONTROLLERS: Mapping[str, Entry] = MappingProxyType({
             Variant("order=lanes,priorities=waiting"),
             Variant("monitor=on", Look("DIM with safety monitor", "purple", "H", "-.")),
         ), as_run="dim-as-run"),
-        Entry("fixed-time", FixedTime, _rival(Look("fixed-time signal", "vermillion", "s", "--"))),
+        Entry("fixed-time", FixedTime, (
+            Variant("", Look("fixed-time signal", "vermillion", "s", "--"), rival=True),
+            Variant("facing=true", Look("two-phase signal", "vermillion", "d", ":")),
+        )),
         Entry("adaptive", Adaptive, _rival(Look("adaptive signal", "orange", "^", "-."))),
         Entry("v2ic", V2IC, _rival(Look("V2I-C", "green", "D", ":")), as_run="v2ic-as-run"),
         Entry("all-way-stop", AllWayStop, _rival(Look("all-way stop", "ink", "X", "--"))),
         Entry("reservation", Reservation, _rival(Look("reservation", "purple", "v", "-."))),
-        Entry("longest-queue", LongestQueue, (
-            Variant("", Look("longest queue first", "brown", "<", ":"), rival=True),
+        Entry("max-pressure", MaxPressure, (
+            Variant("", Look("max-pressure", "brown", "<", ":"), rival=True),
+            Variant("facing=true", Look("two-phase max-pressure", "brown", "h", "--")),
         )),
         Entry("slots", Slots, (
             Variant("", Look("slots for batches", "orange", "d", "-")),

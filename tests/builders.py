@@ -309,7 +309,7 @@ CURVES = {
     "dim:priorities=rotating": (0.6, 380.0), "dim:priorities=waiting": (0.6, 380.0),
     "fixed-time": (8.0, 400.0), "adaptive": (5.0, 450.0), "v2ic": (0.1, 480.0),
     "all-way-stop": (1.5, 550.0),
-    "reservation": (0.3, 600.0), "longest-queue": (4.0, 460.0),
+    "reservation": (0.3, 600.0), "max-pressure": (4.0, 460.0),
 }  # fmt: skip
 
 

@@ -4,7 +4,7 @@
     python -m tests.digests > after.json      # in the new one, on the same machine
     python -m tests.digests before.json after.json
 
-605 runs: every controller under every profile that it serves, on 3 to 6 arms, with both gates,
+629 runs: every controller under every profile that it serves, on 3 to 6 arms, with both gates,
 monitor, noisy perception, human drivers, each car-following law, both sides of the road, skewed
 arms and uneven inflow. A digest covers every byte of the trips and of the recorded trajectories.
 Other processors may round differently in the last digit, so `tests/contract/test_digests.py`
@@ -41,15 +41,16 @@ RULES = (
     "dim:order=lanes,priorities=waiting", "dim:commit=paper", "dim:monitor=on",
     "dim:perception=noisy(intent_error=0.15,kind=symmetric)",
     "dim:perception=noisy(unsignalled=(0.29,0.25))", "dim:perception=noisy(occlusion=true)",
-    "fixed-time", "fixed-time:equal_greens=true", "adaptive", "actuated", "all-way-stop",
-    "longest-queue", "v2ic", "reservation", "unregulated",
+    "fixed-time", "fixed-time:equal_greens=true", "fixed-time:facing=true", "adaptive", "actuated",
+    "all-way-stop", "max-pressure", "max-pressure:facing=true", "v2ic", "reservation",
+    "unregulated",
 )  # fmt: skip
 AS_RUN = (
     "dim", "dim-as-run", "dim-as-run:order=size", "dim-as-run:exit_speed=14", "v2ic-as-run",
-    "v2ic-as-run:approach_speed=14", "v2ic", "fixed-time", "adaptive", "actuated", "longest-queue",
+    "v2ic-as-run:approach_speed=14", "v2ic", "fixed-time", "adaptive", "actuated", "max-pressure",
     "all-way-stop",
 )  # fmt: skip
-SIGNALS = ("fixed-time", "adaptive", "actuated", "longest-queue", "dim", "v2ic")
+SIGNALS = ("fixed-time", "adaptive", "actuated", "max-pressure", "dim", "v2ic")
 SOME = (
     "dim", "dim:gate=harmonious", "fixed-time", "adaptive", "all-way-stop", "v2ic", "reservation",
     "dim:monitor=on",

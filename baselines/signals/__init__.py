@@ -1,1 +1,1 @@
-"""Traffic signals: fixed-time, adaptive, actuated and longest-queue."""
+"""Traffic signals: fixed-time, adaptive, actuated and max-pressure."""

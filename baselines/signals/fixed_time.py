@@ -9,7 +9,9 @@ from itertools import accumulate, count, pairwise
 from numbers import Real
 from typing import Any
 
-from baselines.signals.heads import Colour, Heads, full_order, lane_order, stopping_sight
+from baselines.signals.facing import facing_switch, phases_of
+from baselines.signals.heads import Colour, Heads, lane_order
+from baselines.signals.permitted import PermittedHeads
 from baselines.signals.webster import MIN_GREEN, SignalTiming, timing_of, webster
 from minisim.control import Command, Plan, Site, View, Wake
 from minisim.errors import InputError, number, numbers, plural
@@ -35,6 +37,7 @@ class FixedTime:
     """
 
     name = Name("fixed-time")
+    lights = True
 
     greens: Takes[tuple[float, ...] | float | None, Iterable[float] | float | None] = checked(
         "green of each lane, or one number for all; none means Webster's for the expected demand",
@@ -59,6 +62,7 @@ class FixedTime:
     )  # fmt: skip
     all_red: float = real("all-red after every amber", "s", low=0, high=60, default=0.0)
     order: tuple[int, ...] | None = lane_order()
+    facing: Switch = facing_switch()
     plans: float | None = real(
         "length of the periods of the run with greens of their own, for a demand that varies; each "
         "begins when the last cycle before it ends; none is one plan for all", "s",
@@ -82,18 +86,21 @@ class FixedTime:
         lost = change if self.lost_time is None else self.lost_time
         longer, flow = change - lost, self.saturation_flow
         capped, demand = False, site.demand if demand is None else demand
+        phases = self.phases(site)
         if self.greens is None:
-            lanes = site.intersection.approaches
             optimum = webster(
-                [demand[lane] for lane in lanes],
+                [max(demand[lane] for lane in phase) for phase in phases],
                 saturation_flow=flow, lost_time_per_phase=lost,
                 equal_greens=self.equal_greens, min_green=MIN_GREEN + max(longer, 0.0),
                 max_cycle=self.max_cycle,
             )  # fmt: skip
-            green_of, capped = dict(zip(lanes, optimum.greens, strict=True)), optimum.capped
-            greens = tuple(
-                green_of[lane] - longer if lane in green_of else 0.0 for lane in range(n)
-            )
+            capped = optimum.capped
+            green_of = {
+                lane: green - longer
+                for phase, green in zip(phases, optimum.greens, strict=True)
+                for lane in phase
+            }
+            greens = tuple(green_of.get(lane, 0.0) for lane in range(n))
         else:
             greens = self.greens if isinstance(self.greens, tuple) else (self.greens,) * n
         if len(greens) != n:
@@ -112,31 +119,42 @@ class FixedTime:
     def start(self, site: Site) -> FixedTimeSession:
         """Begin a run; raises `InputError` as `timing` does."""
         programs = [self._program(timing.greens, site) for timing in self.timings(site)]
-        return FixedTimeSession(site, Programs(programs, self.plans or math.inf))
+        heads = PermittedHeads(site, self.name) if self.facing else Heads(site)
+        return FixedTimeSession(site, heads, Programs(programs, self.plans or math.inf))
+
+    def phases(self, site: Site) -> list[tuple[int, ...]]:
+        """The lanes that are green together, in the order of their greens.
+
+        Raises `InputError` if `order` does not list every lane once.
+        """
+        return phases_of(self.order, site.intersection, self.facing)
 
     def _program(self, greens: Sequence[float], site: Site) -> Program:
-        return Program(full_order(self.order, site.intersection), greens, self.amber, self.all_red)
+        return Program(self.phases(site), greens, self.amber, self.all_red)
 
 
 class Program:
-    """Lanes that are green in turn, over and over; the first turns green at time 0.
+    """Phases that are green in turn, over and over; the first turns green at time 0.
 
-    What it shows follows from the time [s] alone. `order` holds the lanes in order of their greens.
+    What it shows follows from the time [s] alone. `phases` are the lanes of each, in the order of
+    their greens. A phase is as long as the longest green of its lanes.
     """
 
     def __init__(
-        self, order: Sequence[int], greens: Sequence[float], amber: float, all_red: float
+        self, phases: Sequence[Sequence[int]], greens: Sequence[float], amber: float, all_red: float
     ) -> None:
-        self._order, self._lanes = order, len(greens)
-        stages = [time for lane in order for time in (greens[lane], amber, all_red)]
+        self._phases, self._lanes = phases, len(greens)
+        lengths = [max(greens[lane] for lane in phase) for phase in phases]
+        stages = [time for green in lengths for time in (green, amber, all_red)]
         self._starts = list(accumulate(stages[:-1], initial=0.0))  # of stages within a cycle [s]
-        self.cycle = math.fsum(greens[lane] + amber + all_red for lane in order)  # [s]
+        self.cycle = math.fsum(green + amber + all_red for green in lengths)  # [s]
 
     def colours(self, time: float) -> list[Colour]:
         """What the heads of all lanes show from `time` [s] on."""
         k, stage = divmod(self._stage(time) % len(self._starts), len(_STAGES))
         shown = [Colour.RED] * self._lanes
-        shown[self._order[k]] = _STAGES[stage]
+        for lane in self._phases[k]:
+            shown[lane] = _STAGES[stage]
         return shown
 
     def next_switch(self, time: float) -> float:
@@ -183,10 +201,10 @@ class Programs:
 class FixedTimeSession:
     """Shows programs; called when it switches, and when a vehicle clears the junction."""
 
-    def __init__(self, site: Site, programs: Programs) -> None:
-        self.plan = Plan(wake_on_clear=True, sight=stopping_sight(site))
+    def __init__(self, site: Site, heads: Heads, programs: Programs) -> None:
+        self.plan = Plan(wake_on_clear=True, sight=heads.sight, marks=heads.marks)
         self._programs = programs
-        self._heads = Heads(site)
+        self._heads = heads
         # In SUMO, a switch acts on the move that ends at its time.
         self._early = site.dt if site.looks_out else 0.0
         self._half_step = site.dt / 2.0
@@ -195,7 +213,6 @@ class FixedTimeSession:
         """Turn the heads to what the program shows; a switch less than half a step away is due."""
         now = view.time + self._half_step + self._early
         wanted = self._programs.colours(now)
-        return [
-            *self._heads.show(view, wanted),
-            Wake(self._programs.next_switch(now) - self._early),
-        ]
+        commands = self._heads.show(view, wanted)
+        switch = self._programs.next_switch(now) - self._early
+        return [*commands, Wake(min(switch, self._heads.next_look))]

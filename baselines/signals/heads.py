@@ -8,6 +8,7 @@ longer stop comfortably keep their right of way; all others stop.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from enum import Enum
 from typing import Any
@@ -63,15 +64,19 @@ class Heads:
         self._crossed = crossed.tolist()  # lane, then movement
         self._exclusive = [[bool(row[way].any()) for way in ways] for row in crossed]  # by lanes
         brakes, dt = [it.deceleration for it in site.types], site.dt
-        self._stops = lambda v: can_stop(v, brakes[v.type])
-        self._open = [Colour.GREEN]
+        self._stops: Callable[[Observed], bool] = lambda v: can_stop(v, brakes[v.type])
+        self._goes = [Colour.GREEN]
         if isinstance(site.vehicle, CruiseVehicle) and site.vehicle.obeys:
-            self._open += [Colour.AMBER]
+            self._goes += [Colour.AMBER]
             self._stops = lambda _: True  # on the spot, see `obeys`
         elif site.looks_out:  # SUMO's own rule (`MSVehicle::planMoveInternal`)
             self._stops = lambda v: braking_distance(v.speed, brakes[v.type], dt) <= v.distance
         self._at_once = site.looks_out
+        self._partners: list[tuple[int, ...]] = [()] * len(ways)  # lanes green with each
         self._let_go: set[int] = set()
+        self.sight = stopping_sight(site)  #: how far before the junction it must see vehicles [m]
+        self.marks: tuple[float, ...] = ()  #: and where it must see them pass [m]
+        self.next_look = math.inf  #: when it must see them again, beside its changes [s]
         self.colours = [Colour.RED] * len(ways)
 
     def show(self, view: View, wanted: Sequence[Colour]) -> list[Command]:
@@ -83,16 +88,19 @@ class Heads:
         self._let_go.intersection_update(v.id for v in view.vehicles)
         for lane, colour in enumerate(wanted):
             if colour is not Colour.GREEN:
-                if self.colours[lane] in self._open and colour not in self._open:
+                if self.colours[lane] in self._goes and colour not in self._goes:
                     commands += self._close(lane, view)
-                elif colour in self._open and self.colours[lane] is Colour.GREEN:
+                elif colour in self._goes and self.colours[lane] is Colour.GREEN:
                     commands.append(Open(lane, amber=True))
                 self.colours[lane] = colour
         for lane, colour in enumerate(wanted):
             if colour is not self.colours[lane] and self._may_open(lane, view):
-                commands.append(Open(lane))
+                commands += self._open(lane)
                 self.colours[lane] = Colour.GREEN
         return commands
+
+    def _open(self, lane: int) -> list[Command]:
+        return [Open(lane)]
 
     def _close(self, lane: int, view: View) -> list[Command]:
         going = committed([v for v in view.vehicles if v.lane == lane], self._stops)
@@ -101,10 +109,12 @@ class Heads:
 
     def _may_open(self, lane: int, view: View) -> bool:
         """Whether no vehicle crosses the lane's way, and no head is green for one that might."""
-        green = [other for other, colour in enumerate(self.colours) if colour is Colour.GREEN]
-        if any(self._exclusive[lane][other] for other in green):
+        with_it = self._partners[lane]
+        green = [k for k, colour in enumerate(self.colours) if colour is Colour.GREEN]
+        if any(self._exclusive[lane][other] for other in green if other not in with_it):
             return False
-        crossing = (v for v in view.vehicles if v.distance < 0.0 or v.id in self._let_go)
+        others = (v for v in view.vehicles if v.lane not in with_it)
+        crossing = (v for v in others if v.distance < 0.0 or v.id in self._let_go)
         crossed = self._crossed[lane]
         return self._at_once or not any(crossed[self._rows[v.lane][v.manoeuvre]] for v in crossing)
 

@@ -1,4 +1,4 @@
-"""What is common to signals that end their phases by a rule: one phase per approach.
+"""What is common to signals that end their phases by a rule.
 
 Between two phases the old lane shows amber. The new one turns green once no vehicle crosses its
 way any more (`Heads`). A phase is timed from when its green is shown, so drivers see its length.
@@ -10,7 +10,9 @@ import math
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from baselines.signals.heads import Colour, Heads, full_order, stopping_sight
+from baselines.signals.facing import phases_of
+from baselines.signals.heads import Colour, Heads
+from baselines.signals.permitted import PermittedHeads
 from minisim.control import Command, Observed, Plan, Site, View, Wake
 from minisim.errors import InputError, number
 
@@ -46,24 +48,28 @@ class Verdict(NamedTuple):
 
 
 class PhaseSession:
-    """Shows green to one lane at a time; a subclass judges when a phase ends.
+    """Shows green to one phase at a time; a subclass judges when a phase ends.
 
     It is called when its rule has asked for it, when a vehicle clears the junction, and when one
     passes a mark. The rule sees the last `detector_range` [m] before the junction, and is asked
     once a phase has lasted for `min_green`. `marks` are where it must see front bumpers pass [m].
-    An `order` must list every lane once (else `InputError`); None means a, b, c….
+    An `order` must list every lane once (else `InputError`); None means a, b, c…. A phase is an
+    approach, or with `facing` heads also the one that faces it; its first lane stands for it.
     """
 
     def __init__(
         self, site: Site, detector_range: float, min_green: float, amber: float,
         marks: tuple[float, ...] = (), order: tuple[int, ...] | None = None,
+        facing: PermittedHeads | None = None,
     ) -> None:  # fmt: skip
         road = site.intersection.approach_length
-        sight = min(max(detector_range, stopping_sight(site)), road)
-        marks = tuple(min(mark, road) for mark in marks)
+        heads = self._heads = facing or Heads(site)
+        sight = min(max(detector_range, heads.sight), road)
+        marks = (*(min(mark, road) for mark in marks), *heads.marks)
         self.plan = Plan(marks=marks, wake_on_clear=True, sight=sight)
-        self._order = full_order(order, site.intersection)
-        self._heads = Heads(site)
+        phases = phases_of(order, site.intersection, facing is not None)
+        self._phases = {phase[0]: phase for phase in phases}
+        self._order = tuple(self._phases)
         self._dt = site.dt
         self._exact = site.looks_out  # times its events like SUMO
         self._early = site.dt - TICK if self._exact else site.dt / 2.0
@@ -99,14 +105,17 @@ class PhaseSession:
             self._rang = self._due
             self._go_on(view)
         wanted = [Colour.RED] * len(self._heads.colours)
-        wanted[self._lane] = self._colour
+        for lane in self._phases[self._lane]:
+            wanted[lane] = self._colour
         commands = self._heads.show(view, wanted)
-        if self._began is None and self._heads.colours[self._lane] is Colour.GREEN:
+        shown = {self._heads.colours[lane] for lane in self._phases[self._lane]}
+        if self._began is None and shown == {Colour.GREEN}:
             self._began = view.time
             self._due = self._since(view) + self._min_green
-        if math.isinf(self._due):
-            return commands
-        return [*commands, Wake(self._due - (self._dt + self._early if self._exact else 0.0))]
+        due = min(
+            self._due - (self._dt + self._early if self._exact else 0.0), self._heads.next_look
+        )
+        return commands if math.isinf(due) else [*commands, Wake(due)]
 
     def _go_on(self, view: View) -> None:
         if self._began is None:  # the amber is over; the green comes when the way is clear

@@ -31,8 +31,9 @@ def level_of_service(delay: float, kind: str = "unsignalised") -> str:
 
 
 def kind_of_junction(run: Run) -> str:
-    """ "signalised" if the controller opened lanes, as signals do; else "unsignalised"."""
-    return "signalised" if run.exchange.get("Open") else "unsignalised"
+    """ "signalised" if the controller has `lights` or opened lanes; else "unsignalised"."""
+    lights = getattr(run.controller, "lights", False) or run.exchange.get("Open")
+    return "signalised" if lights else "unsignalised"
 
 
 def grade(run: Run) -> int | None:

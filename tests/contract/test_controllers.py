@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 
 import minisim
-from baselines import V2IC, Actuated, Adaptive, AllWayStop, FixedTime, LongestQueue, Reservation
+from baselines import V2IC, Actuated, Adaptive, AllWayStop, FixedTime, MaxPressure, Reservation
 from dim import AsRunDim, Dim, Mixed, Monitor, NoisyPerception
 from minisim.arrivals import Arrivals
 from minisim.control import (
@@ -55,7 +55,7 @@ MORE: tuple[Controller, ...] = (
     FixedTime(equal_greens=True, max_cycle=90.0),
     Adaptive(amber=0.0, min_green=0.5, max_green=8.0, extend_max_green=True),
     Actuated(amber=0.0, min_green=0.5, max_green=8.0, max_gap=1.0),
-    LongestQueue(interval=2.0, amber=0.0, detector_range=30.0),
+    MaxPressure(interval=2.0, amber=0.0, detector_range=30.0),
     AllWayStop(reaction=0.0),
     V2IC(reach=100.0, period=0.2),
     Reservation(reach=120.0, buffer=0.0, period=0.2),

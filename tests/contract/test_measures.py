@@ -16,7 +16,7 @@ from scenarios import four_way
 from scenarios.controllers import SAFE, controller_named
 
 #: Vehicles that send each other nothing, or whose controllers only show lights.
-SILENT = ("dim", "fixed-time", "adaptive", "actuated", "longest-queue", "all-way-stop")
+SILENT = ("dim", "fixed-time", "adaptive", "actuated", "max-pressure", "all-way-stop")
 
 
 @pytest.fixture(scope="module", params=SAFE)

@@ -17,12 +17,12 @@ from baselines import (
     Adaptive,
     AllWayStop,
     FixedTime,
-    LongestQueue,
+    MaxPressure,
     Platoons,
     Reservation,
     Slots,
 )
-from minisim.control import Controller, Site, cover_of
+from minisim.control import ORDINARY, Controller, Site, cover_of
 from minisim.errors import InputError
 from minisim.junction.conflicts import CLEARANCE, conflict_zones, entry_room
 from minisim.junction.geometry import Intersection
@@ -45,7 +45,7 @@ BUFFERS = st.none() | floats(0.5, 2.0)
 RIVALS: dict[str, st.SearchStrategy[Controller]] = {
     "fixed-time": st.builds(
         FixedTime, greens=st.none() | floats(2.0, 20.0), amber=AMBERS,
-        all_red=st.sampled_from([0.0, 1.0]),
+        all_red=st.sampled_from([0.0, 1.0]), facing=st.booleans(),
     ),
     "adaptive": st.builds(
         Adaptive, detector_range=floats(15.0, 200.0), min_time_loss=floats(0.0, 5.0),
@@ -55,8 +55,9 @@ RIVALS: dict[str, st.SearchStrategy[Controller]] = {
         Actuated, max_gap=floats(0.0, 10.0), detector_gap=floats(0.1, 20.0),
         passing_time=floats(0.1, 5.0), presence=st.booleans(), **GREENS,
     ),
-    "longest-queue": st.builds(
-        LongestQueue, interval=floats(0.5, 15.0), detector_range=floats(15.0, 200.0), amber=AMBERS
+    "max-pressure": st.builds(
+        MaxPressure, interval=floats(0.5, 15.0), detector_range=floats(2.0, 200.0), amber=AMBERS,
+        facing=st.booleans(),
     ),
     "all-way-stop": st.builds(AllWayStop, reaction=st.just(0.0) | floats(0.0, 3.0)),
     "v2ic": st.sampled_from([V2IC(), V2IC(reach=60.0, period=0.2)]),
@@ -95,6 +96,8 @@ def test_no_vehicle_collides_and_each_is_served(name: str, data: st.DataObject) 
             profile=Profile(name="random", vehicle=vehicle, speed_limit=limit),
             recorded=data.draw(demands(n, 700.0)).draw(n, 60.0, data.draw(st.integers(0, 1000))),
         )
+    if getattr(controller, "facing", False) and scenario.profile.vehicle not in ORDINARY:
+        controller = replace(controller, facing=False)  # as it is refused
     run = minisim.simulate(scenario, controller, record="junction", on_collision="record")
     assert run.collisions == ()
     assert run.trips["arrival_s"].notna().all()

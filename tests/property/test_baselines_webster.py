@@ -47,7 +47,7 @@ def test_websters_cycle_is_close_to_the_least_delay(n: int, ratio: float) -> Non
 def programs(draw: st.DrawFn) -> Program:
     n = draw(st.integers(2, 5))
     return Program(
-        range(n),
+        [(lane,) for lane in range(n)],
         draw(st.lists(floats(0.5, 60.0), min_size=n, max_size=n)),
         amber=draw(st.sampled_from([0.0, 2.0, 3.5])),
         all_red=draw(st.sampled_from([0.0, 1.0])),

@@ -16,7 +16,7 @@ from scenarios import four_way
 from scenarios.controllers import controller_named
 
 CONTROLLERS = (
-    "dim", "dim:gate=harmonious", "fixed-time", "adaptive", "all-way-stop", "longest-queue", "v2ic",
+    "dim", "dim:gate=harmonious", "fixed-time", "adaptive", "all-way-stop", "max-pressure", "v2ic",
     "reservation", "slots",
 )  # fmt: skip
 DENSITIES = (150.0, 200.0, 250.0, 300.0, 350.0)

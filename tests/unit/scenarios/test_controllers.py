@@ -34,7 +34,7 @@ def test_names_are_spellings(name: str) -> None:
 def test_the_paper_s_four_come_first_among_the_rivals() -> None:
     assert RIVALS == (
         "dim", "dim:gate=harmonious", "fixed-time", "adaptive", "v2ic", "all-way-stop",
-        "reservation", "longest-queue",
+        "reservation", "max-pressure",
     )  # fmt: skip
     assert set(RIVALS) < set(SAFE) < set(VARIANTS)
     assert not any("as-run" in name or name == "unregulated" for name in SAFE)

@@ -218,7 +218,8 @@ def test_each_plan_has_websters_greens_for_the_demand_of_its_time() -> None:
 
 
 def test_a_plan_begins_when_the_cycle_before_it_ends() -> None:
-    cycle = Program((0, 1), (10.0, 20.0), 2.0, 0.0), Program((0, 1), (30.0, 5.0), 2.0, 0.0)
+    turns = (0,), (1,)
+    cycle = Program(turns, (10.0, 20.0), 2.0, 0.0), Program(turns, (30.0, 5.0), 2.0, 0.0)
     programs = Programs(cycle, 100.0)  # cycles of 34 s, then 39 s: the second begins at 102 s
     assert programs.colours(99.0) == [Colour.RED, Colour.GREEN] == cycle[0].colours(99.0)
     assert programs.colours(101.0) == [Colour.RED, Colour.AMBER]
@@ -229,7 +230,8 @@ def test_a_plan_begins_when_the_cycle_before_it_ends() -> None:
 
 
 def test_plans_shorter_than_a_cycle_are_left_out() -> None:
-    long, short = Program((0, 1), (100.0, 100.0), 2.0, 0.0), Program((0, 1), (5.0, 5.0), 2.0, 0.0)
+    turns = (0,), (1,)
+    long, short = Program(turns, (100.0, 100.0), 2.0, 0.0), Program(turns, (5.0, 5.0), 2.0, 0.0)
     programs = Programs([long, short, short, short, long], 60.0)
     assert programs.next_switch(203.0) == 204.0  # the fourth begins: its 180 … 240 s hold 204 s
     assert programs.colours(204.0 + 6.0) == [Colour.AMBER, Colour.RED]

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from baselines import Actuated, Adaptive, AllWayStop, FixedTime, LongestQueue
+from baselines import Actuated, Adaptive, AllWayStop, FixedTime, MaxPressure
 from minisim import simulate
 from minisim.demand import DemandProfile, Period
 from minisim.errors import InputError
@@ -41,7 +41,7 @@ def test_worked_examples_of_a_stop_controlled_junction() -> None:
 @pytest.mark.parametrize("name", SAFE)
 def test_signals_are_graded_as_signals_and_all_others_as_unsignalised(name: str) -> None:
     run = simulate(four_way(250, profile="fair", horizon=60.0), controller_named(name))
-    signal = isinstance(run.controller, FixedTime | Adaptive | Actuated | LongestQueue)
+    signal = isinstance(run.controller, FixedTime | Adaptive | Actuated | MaxPressure)
     assert kind_of_junction(run) == ("signalised" if signal else "unsignalised")
 
 

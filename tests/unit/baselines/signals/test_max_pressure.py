@@ -1,14 +1,13 @@
-"""Longest queue first: which is next, ties, and why no two approaches are green together."""
+"""Max-pressure: which phase is next, ties, and that it serves every demand that fits."""
 
 from __future__ import annotations
 
 import pytest
 
 import minisim
-from baselines import LongestQueue
-from baselines.signals.longest_queue import QueueSession
+from baselines import FixedTime, MaxPressure
+from baselines.signals.max_pressure import PressureSession
 from minisim.control import Observed, View
-from minisim.errors import InputError
 from scenarios.library import four_way, regular
 from tests.builders import drive, seen, show
 
@@ -26,7 +25,7 @@ def queues(*lengths: int) -> list[Observed]:
 
 def choices(*views: tuple[int, list[Observed]]) -> list[int]:
     """The lanes chosen one after the other; each view with the lane that is green in it."""
-    session = QueueSession(LongestQueue(), SITE)
+    session = PressureSession(MaxPressure(), SITE)
     return [
         session.judge(View(10.0 * k, tuple(vehicles)), lane, 10.0).lane
         for k, (lane, vehicles) in enumerate(views, start=1)
@@ -60,13 +59,13 @@ def test_it_looks_once_per_interval_and_changes_with_an_amber() -> None:
     def vehicles(time: float) -> tuple[Observed, ...]:
         return tuple(queues(0, 0, 3, 0) if 12.0 < time < 29.0 else queues(1, 0, 0, 0))
 
-    assert drive(LongestQueue(), SITE, 60.0, vehicles) == {
+    assert drive(MaxPressure(), SITE, 60.0, vehicles) == {
         0: ["Open 0"], 20: ["Close 0"], 22: ["Open 2"], 32: ["Close 2"], 34: ["Open 0"],
     }  # fmt: skip
 
 
 def test_the_interval_runs_from_the_green_that_is_shown() -> None:
-    session = LongestQueue(interval=5.0).start(SITE)
+    session = MaxPressure(interval=5.0).start(SITE)
     show(session, 0.0)
     crossing = seen(7, 0, 2, -2.0, 0.0)
     c = tuple(queues(0, 0, 3, 0))
@@ -76,6 +75,12 @@ def test_the_interval_runs_from_the_green_that_is_shown() -> None:
     d = tuple(queues(0, 0, 0, 9))
     assert show(session, 12.0, *d) == []
     assert show(session, 13.5, *d) == ["Close 2"]
+
+
+def test_queues_of_approaches_that_face_each_other_are_added() -> None:
+    session = PressureSession(MaxPressure(facing=True), SITE)
+    for lengths, first in (((5, 3, 0, 3), 1), ((5, 3, 2, 3), 0), ((0, 1, 0, 0), 1)):
+        assert session.judge(View(10.0, tuple(queues(*lengths))), 0, 10.0).lane == first
 
 
 @pytest.mark.parametrize("n", [3, 4, 5, 6])
@@ -89,15 +94,36 @@ def test_no_two_approaches_could_be_green_together(n: int) -> None:
 def test_the_busier_lanes_get_more_green() -> None:
     # At 4:4:1:1 the two busy lanes come to wait less than under equal treatment: all are served.
     scenario = four_way(200, split=(4, 4, 1, 1), profile="fair", horizon=1800.0)
-    run = minisim.simulate(scenario, LongestQueue(), seed=1, record="all")
+    run = minisim.simulate(scenario, MaxPressure(), seed=1, record="all")
     frame = run.trajectories
     held = frame[~frame["right_of_way"] & (frame["s_m"] < run.site.intersection.approach_length)]
     share = held.groupby("lane").size() / frame.groupby("lane").size()
     assert max(share["a"], share["b"]) < min(share["c"], share["d"])
 
 
-def test_a_detector_shorter_than_a_queue_needs_is_refused() -> None:
-    """Its next vehicle, a length of 5 m and a gap of 2.5 m behind, would not be seen."""
-    with pytest.raises(InputError, match=r"detector_range \[m\] must be at least 11.25, got 11"):
-        LongestQueue(detector_range=11.0).start(SITE)
-    LongestQueue(detector_range=11.25).start(SITE)
+@pytest.mark.parametrize("facing", [False, True])
+@pytest.mark.parametrize("split", [(1, 1, 1, 1), (4, 4, 1, 1), (8, 1, 1, 1)])
+def test_it_serves_every_demand_that_fits(split: tuple[int, ...], facing: bool) -> None:
+    """Varaiya 2013, theorem 2: queues stay bounded if any signal could serve the demand.
+
+    In all, 1080 veh/h fit here. Greens that know as little of the demand, all alike, let the queues
+    of uneven demand grow.
+    """
+    scenario = four_way(270, split=split, profile="fair", horizon=3600.0)
+    grown, alike = (
+        minisim.simulate(scenario, signal, 1).summary(["queue_growth"])["queue_growth"]
+        for signal in (MaxPressure(facing=facing), FixedTime(equal_greens=True))
+    )
+    assert grown < 8.0
+    assert (alike > 50.0) is (max(split) > 1)
+
+
+def test_what_dim_sees_is_too_little_for_that() -> None:
+    """At 8 m it sees whether any wait, not how many, and a lane of few vehicles gets too much."""
+    scenario = four_way(300, split=(8, 1, 1, 1), profile="fair", horizon=3600.0)
+    near, far = (
+        minisim.simulate(scenario, signal, 1).summary(["queue_growth"])["queue_growth"]
+        for signal in (MaxPressure(detector_range=8.0), MaxPressure())
+    )
+    assert far < 8.0
+    assert near > 50.0
