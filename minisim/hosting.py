@@ -129,7 +129,7 @@ class Hosted:
             if 0.0 < view.time <= self.scenario.warmup and keeps(self.session, Counting):
                 self.before.update(self.session.counts)
             for command in commands:
-                _check_command(command, tick, self.site, len(self.arrivals))
+                check_command(command, tick, self.site, len(self.arrivals))
                 self.exchange[type(command).__name__] += 1
             if view.time < self.scenario.warmup:
                 self.exchange.clear()
@@ -269,9 +269,10 @@ def checked_window(window: object) -> tuple[float, float]:
     return start, end if end == math.inf else number("end of record_window [s]", end, low=start)
 
 
-def _check_command(command: Command, tick: int, site: Site, vehicles: int) -> None:
+def check_command(command: Command, tick: int, site: Site, vehicles: int | None = None) -> None:
+    """Raise `InputError` for what is not a command, or one that cannot be carried out at `tick`."""
     if isinstance(command, TO_VEHICLES):
-        integer("vehicle", command.vehicle, low=0, high=vehicles - 1)
+        integer("vehicle", command.vehicle, low=0, high=vehicles and vehicles - 1)
         if isinstance(command, Advise) and command.speed != math.inf:
             number("advised speed [m/s]", command.speed, low=0)
         if isinstance(command, Brake):
