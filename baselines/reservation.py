@@ -318,7 +318,9 @@ class LateSession(ReservationSession):
         self._wait = steps(channel.slowest, site.dt)
         if reach is None:
             late = 2.0 * channel.slowest + controller.radio.interval
-            reach = min(self.plan.sight + late * site.speed_limit, site.intersection.approach_length)
+            reach = min(
+                self.plan.sight + late * site.speed_limit, site.intersection.approach_length
+            )
             self.plan = Plan(marks=(reach,), sight=reach)
         self._slack = controller.buffer / 2.0 / site.dt
         self._reports: Mapping[int, Report] = {}

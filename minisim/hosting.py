@@ -246,7 +246,7 @@ def _blame(
     """The error that says where a controller's own code failed, and why."""
     if isinstance(error, MinisimError) and not isinstance(error, InputError):
         raise error
-    module = sys.modules.get(type(of).__module__)
+    module = sys.modules.get(of.__module__)
     folder = Path(getattr(module, "__file__", None) or "/").parent
     why = error if isinstance(error, InputError) else told(error, folder)
     return ControllerError(f"controller {name_of(controller)!r}{when}: {why}")

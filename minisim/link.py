@@ -10,16 +10,17 @@ It works for every controller with a `radio`, in every host. Messages go through
   and is repeated every interval until the vehicle names that number. Vehicles do what the highest
   number says. Until told, they stop at their hold lines.
 
-Safety (after Dresner and Stone, JAIR 31 (2008), §2: a lost message may cost time, but must not cause
-a collision): a vehicle *may hold* the right of way from the first message that gives it until it
-has left, or has said that it gave it up. Right of way is given only while no vehicle in conflict
-may hold it, whatever the controller commands, so no loss or delay lets two in conflict go at once.
-A vehicle told to stop that no longer can keeps its right of way, and says so. In each lane, right
-of way is given from front to back, so those that hold it can leave, and others get their turn.
+Safety, after Dresner and Stone (JAIR 31 (2008), section 2: a lost message may cost time, but must
+not cause a collision). A vehicle *may hold* the right of way from the first message that gives it
+until it has left, or has said that it gave it up. Right of way is given only while no vehicle in
+conflict may hold it, whatever the controller commands, so no loss or delay lets two in conflict go
+at once. A vehicle that is told to stop and no longer can keeps its right of way, and says so. In
+each lane, right of way is given from front to back, so those that hold it can leave, and others get
+their turn.
 
 A `Reserve` does not wait for vehicles in conflict: the session answers for it, since it knows when
-the vehicle will be where. It is sent once, takes effect at a time that both know, and is void if it
-comes later.
+the vehicle will be where. It is sent once, takes effect at a time that both know (all clocks are
+right), and is void if it comes later.
 
 Lights (`Open`, `Close`) are seen, not sent.
 """
@@ -37,8 +38,8 @@ from minisim.control import (
     Brake,
     Command,
     Controller,
-    Cover,
     Counting,
+    Cover,
     Go,
     Hold,
     Observed,
@@ -380,6 +381,7 @@ class Link:
         self._alarm = Alarm(plan.period, site.dt)
         self._due = 0  # when vehicles speak next
         self._began = False
+        self.__module__ = type(session).__module__  # where errors come from
 
     def __getattr__(self, name: str) -> Any:
         """Whatever else the session has, such as `kind`."""
