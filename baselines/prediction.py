@@ -100,8 +100,8 @@ def predict(
 ) -> Motion | None:  # fmt: skip
     """The motion of a vehicle until it arrives, if it may drive on; None if it hits a leader.
 
-    For its first `held` steps it has to stop at the junction entry. `lane` holds the vehicles ahead,
-    nearest first; `exit_lane` those that enter that lane earlier.
+    For its first `held` steps it has to stop at the junction entry. `lane` holds the vehicles
+    ahead, nearest first; `exit_lane` those that enter that lane earlier.
     """
     ahead = _stacked(lane, [leader.until for leader in lane])
     entering = _stacked(exit_lane, [leader.shift for leader in exit_lane])
