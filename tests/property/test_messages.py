@@ -17,9 +17,7 @@ from scenarios.strategies import floats, scenarios
 from tests.builders import drained, share
 
 #: The controllers that promise that no vehicles collide, and whose messages can fail.
-TALKING = [
-    name for name, it in CONTROLLERS.items() if radio_of(it.make) and cover_of(it.make).laws
-]
+TALKING = [name for name, it in CONTROLLERS.items() if radio_of(it.make) and cover_of(it.make).laws]
 #: Time to serve the arrivals of two minutes with half of the messages lost [s].
 PATIENCE = 6000.0
 
