@@ -28,12 +28,11 @@ old; `buffer` covers it. Vehicles that differ or follow an unknown law are refus
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 
 from baselines.prediction import Floats, Leader, courses, law_of, predict
-from minisim.channel import steps
 from minisim.control import (
     Command,
     Cover,
@@ -42,8 +41,6 @@ from minisim.control import (
     Observed,
     Plan,
     Radio,
-    Report,
-    Reserve,
     Site,
     View,
     Wake,
@@ -55,7 +52,6 @@ from minisim.junction.partings import branch
 from minisim.laws import Traits, traits_of
 from minisim.names import Name
 from minisim.parameters import declared, real
-from minisim.ticks import time_of
 
 #: Smaller differences from the prediction do not count [m], [m/s].
 POSITION_TOLERANCE, SPEED_TOLERANCE = 0.05, 0.05
@@ -91,8 +87,10 @@ class Reservation:
 
         A period below the host's step is refused, too.
         """
+        from baselines.promises import PromiseSession  # which builds on this module
+
         self.covers.check(self.name, site.vehicle)
-        return LateSession(self, site) if site.channel else ReservationSession(self, site)
+        return PromiseSession(self, site) if site.channel else ReservationSession(self, site)
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,16 +183,6 @@ class Manager:
         }
         return Slot(seen.id, seen.lane, me, p, now, s, v, enters, zones, hard)
 
-    def meets(self, seen: Observed, slot: Slot) -> bool:
-        """Whether a vehicle leaves by the same lane as a holder, or comes from the same one."""
-        p = self._rows[seen.lane][seen.manoeuvre]
-        same_exit = self._ways[p].exit_arm == self._ways[slot.movement].exit_arm
-        return same_exit or seen.lane == slot.lane
-
-    def conflicts(self, seen: Observed, slot: Slot) -> bool:
-        """Whether a vehicle's movement is in conflict with a passage."""
-        return self._rows[seen.lane][seen.manoeuvre] in slot.zones
-
     def fits(self, slot: Slot, *, last: bool) -> bool:
         """Whether a passage fits every other; the `last` comes after all in its exit lane."""
         if slot.hard:
@@ -248,7 +236,7 @@ class ReservationSession:
             commands.append(Wake(view.time + self._period))
         return commands
 
-    def _permit(self, vehicle: int) -> Go:
+    def _permit(self, vehicle: int) -> Command:
         """The command that gives a new holder the right of way."""
         return Go(vehicle)
 
@@ -295,99 +283,3 @@ class ReservationSession:
                 slots[vehicle] = slot
                 del self._requests[vehicle]
                 yield vehicle
-
-
-class LateSession(ReservationSession):
-    """One run in which messages fail (`minisim.link`): passages are promises, and none is revoked.
-
-    A `Reserve` takes effect when the slowest message has arrived, as in Crossroads (Andert,
-    Khayatian, Shrivastava, DAC 2017). Until then the vehicle counts as held, so its passage is
-    known even if the manager saw it a while ago. If the message is lost, the vehicle says later
-    that it holds nothing. Only then its passage is free again: it may have been heard.
-
-    A vehicle keeps to its passage within half the `buffer`, or gives it up while it can stop (as
-    Dresner and Stone's vehicles cancel), so two in conflict stay out of each other's zones. A
-    passage behind a vehicle that did not hear of its own ends like that. What may not be missing is
-    a vehicle that slows down another one in its exit lane, which would be early without it: so the
-    latter has its request refused until the former has said that it holds.
-    """
-
-    def __init__(self, controller: Reservation, site: Site) -> None:
-        channel, reach = site.channel, controller.reach
-        super().__init__(controller, site)
-        self._wait = steps(channel.slowest, site.dt)
-        if reach is None:
-            late = 2.0 * channel.slowest + controller.radio.interval
-            reach = min(
-                self.plan.sight + late * site.speed_limit, site.intersection.approach_length
-            )
-            self.plan = Plan(marks=(reach,), sight=reach)
-        self._slack = controller.buffer / 2.0 / site.dt
-        self._reports: Mapping[int, Report] = {}
-        self._effect: dict[int, int] = {}  #: when each vehicle's reservation takes effect [steps]
-        self._sure: set[int] = set()  #: vehicles that are known to keep to their passages
-        self._strays: list[Observed] = []  #: that hold the right of way after their passage
-
-    def decide(self, view: View) -> Iterable[Command]:
-        """Note what the vehicles say, then consider their requests."""
-        self._reports = view.reports
-        return super().decide(view)
-
-    def _revoke(self, seen: dict[int, Observed], ahead: dict[int, int], now: int) -> Iterator[int]:  # noqa: ARG002
-        """Forget reservations that did not arrive or were given up, and note which are sure."""
-        slots = self.manager.slots
-        self._sure = slots.keys() - seen.keys()
-        self._strays = [seen[v] for v in seen if v not in slots and self._reports[v].holds]
-        for vehicle in seen:
-            report, leader = self._reports[vehicle], ahead.get(vehicle)
-            if vehicle not in slots or self._step(report) <= self._effect[vehicle]:
-                continue
-            if not report.holds:
-                del slots[vehicle]
-            elif leader is None or leader in self._sure:
-                self._sure.add(vehicle)
-        yield from ()
-
-    def _grant(self, seen: dict[int, Observed], ahead: dict[int, int], now: int) -> Iterator[int]:
-        """Reserve what is possible; return the ids of the new holders."""
-        slots = self.manager.slots
-        for vehicle in list(self._requests):
-            slot = self._passage(seen[vehicle], ahead.get(vehicle), now + self._wait)
-            if slot is not None and self.manager.fits(slot, last=True):
-                slots[vehicle], self._effect[vehicle] = slot, now + self._wait
-                del self._requests[vehicle]
-                yield vehicle
-
-    def _passage(self, me: Observed, leader: int | None, effect: int) -> Slot | None:
-        """A vehicle's passage from `effect` [steps] on; None if it cannot be sure."""
-        manager, report = self.manager, self._reports[me.id]
-        then = self._step(report)
-        met = [slot for slot in manager.slots.values() if manager.meets(me, slot)]
-        unknown = leader is not None and leader not in manager.slots
-        if report.holds or unknown or any(slot.start > then for slot in met):
-            return None
-        slot = manager.predict(me, then, effect - then)
-        doubtful = [it.vehicle for it in met if it.vehicle not in self._sure and it.lane != me.lane]
-        if slot is None or any(manager.conflicts(it, slot) for it in self._strays):
-            return None
-        if doubtful:
-            without = manager.predict(me, then, effect - then, doubtful)
-            if without is None or without.s.shape != slot.s.shape or (without.s != slot.s).any():
-                return None
-        return slot
-
-    def _permit(self, vehicle: int) -> Go:
-        """The promise of a passage."""
-        slot, dt, slack = self.manager.slots[vehicle], self._dt, self._slack
-        last = len(slot.s) - 1
-
-        def keeps(me: Observed, time: float) -> bool:
-            now = time / dt - slot.start
-            first, end = math.ceil(now - slack - 1e-6), math.floor(now + slack + 1e-6)
-            low, high = (slot.s[min(max(k, 0), last)] for k in (first, end))
-            return bool(low - POSITION_TOLERANCE <= -me.distance <= high + POSITION_TOLERANCE)
-
-        return Reserve(vehicle, time_of(self._effect[vehicle], dt), keeps)
-
-    def _step(self, report: Report) -> int:
-        return round(report.time / self._dt)
