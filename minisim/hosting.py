@@ -121,7 +121,7 @@ class Hosted:
         """
         try:
             began = time.thread_time_ns() if self.timed else 0
-            commands = _listed(self.session.decide(view))
+            commands = listed(self.session.decide(view))
             if self.timed:
                 self.times.append(time.thread_time_ns() - began)
             self.exchange["decisions"] += 1
@@ -252,7 +252,8 @@ def _blame(
     return ControllerError(f"controller {name_of(controller)!r}{when}: {why}")
 
 
-def _listed(answer: object) -> list[Command]:
+def listed(answer: object) -> list[Command]:
+    """A session's answer as a list; raises `InputError` if it is none."""
     if isinstance(answer, list):  # as nearly always, and the other test takes longer
         return answer
     if isinstance(answer, Iterable):

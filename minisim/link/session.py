@@ -28,7 +28,7 @@ from minisim.control import (
     keeps,
 )
 from minisim.errors import InputError, show
-from minisim.hosting import Alarm, check_command
+from minisim.hosting import Alarm, check_command, listed
 from minisim.link.messages import Confirmed, Order, Status
 from minisim.link.office import Office
 from minisim.link.vehicles import Vehicles
@@ -80,9 +80,8 @@ class Linked:
         """Begin a run; raises what the controller's `start` raises."""
         site = site.with_channel(self.channel)
         session = self.controller.start(site)
-        if not self.channel or not isinstance(getattr(session, "plan", None), Plan):
-            return session  # without a plan, the host refuses it
-        return Link(session, self.radio or Radio(), site)
+        sound = keeps(session, Session) and isinstance(session.plan, Plan)  # or the host refuses it
+        return Link(session, self.radio or Radio(), site) if self.channel and sound else session
 
 
 class Link:
@@ -151,7 +150,7 @@ class Link:
         """Ask the session; the commands that need no message."""
         self._began = True
         self._alarm.reset(now)
-        for command in self._session.decide(self._office.view(now)):
+        for command in listed(self._session.decide(self._office.view(now))):
             check_command(command, now, self._site)
             if isinstance(command, Wake):
                 self._alarm.set(command)

@@ -157,6 +157,10 @@ def test_an_error_of_the_session_is_told_with_its_file_and_line() -> None:
     failing = Linked(Scripted(odd, radio=Radio()), Channel(loss=0.1))
     with pytest.raises(ControllerError, match=r"at 0\.0 s: 7 is not a command"):
         minisim.simulate(FAIR, failing)
+    odd = lambda _: 7  # noqa: E731
+    failing = Linked(Scripted(odd, radio=Radio()), Channel(loss=0.1))
+    with pytest.raises(ControllerError, match=r"at 0\.0 s: decide\(\) must return commands"):
+        minisim.simulate(FAIR, failing)
 
 
 def test_what_else_a_session_has_is_kept() -> None:
