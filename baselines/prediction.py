@@ -23,6 +23,7 @@ from minisim.laws import (
     build_law,
     closeness,
     follow,
+    hold,
     keep_room,
     room_behind,
     short_of,
@@ -99,11 +100,12 @@ class Motion(NamedTuple):
 
 def predict(
     law: Law, me: Traits, course: Course, position: float, speed: float,
-    *, lane: Sequence[Leader] = (), exit_lane: Sequence[Leader] = (),
+    *, lane: Sequence[Leader] = (), exit_lane: Sequence[Leader] = (), held: int = 0,
 ) -> Motion | None:  # fmt: skip
     """The motion of a vehicle until it arrives, if it may drive on; None if it hits a leader.
 
-    `lane` holds the vehicles ahead, nearest first; `exit_lane` those that enter that lane earlier.
+    For its first `held` steps it has to stop at the junction entry. `lane` holds the vehicles
+    ahead, nearest first; `exit_lane` those that enter that lane earlier.
     """
     ahead = _stacked(lane, [leader.until for leader in lane])
     entering = _stacked(exit_lane, [leader.shift for leader in exit_lane])
@@ -111,7 +113,7 @@ def predict(
     while count == UNFINISHED:  # it ends: every leader arrives, and a free road is driven on
         steps *= 2
         s, v = np.empty(steps), np.empty(steps)
-        count, hard = _drive(law, me, course, position, speed, ahead, entering, s, v)
+        count, hard = _drive(law, me, course, position, speed, ahead, entering, held, s, v)
     return Motion(s[:count].copy(), v[:count].copy(), hard) if count else None
 
 
@@ -129,7 +131,7 @@ def _stacked(leaders: Sequence[Leader], bound: list[float]) -> Leaders:
 @njit
 def _drive(
     law: Law, me: Traits, course: Course, position: float, speed: float,
-    lane: Leaders, exit_lane: Leaders, s_out: Floats, v_out: Floats,
+    lane: Leaders, exit_lane: Leaders, held: int, s_out: Floats, v_out: Floats,
 ) -> tuple[int, bool]:  # fmt: skip
     """Fill `s_out` and `v_out` as `minisim.engine.kernel` would drive the vehicle.
 
@@ -160,7 +162,7 @@ def _drive(
             if not near and (behind or s >= course.crossing):
                 break
         z_exit = 0.0
-        if (first or near or s >= 0.0) and k < exit_lane.s.shape[1]:
+        if k >= held and (first or near or s >= 0.0) and k < exit_lane.s.shape[1]:
             for j in range(len(exit_lane.s) - 1, -1, -1):
                 if exit_lane.s[j, k] >= 0.0:  # the last to enter it
                     if exit_lane.s[j, k] < math.inf:
@@ -181,6 +183,8 @@ def _drive(
         left = course.crossing - s
         if left > 0.0 and course.behind < course.turn and braking_begins(v, left, me, law):
             acc = min(acc, slow_down(v, acc, course.behind, left, me, law))
+        if k < held and s < 0.0:
+            acc = min(acc, hold(v, s + law.entry, me, law))
         if short_of(room, v, v + acc * law.dt, me, law):
             acc = min(acc, keep_room(v, room, me, law))
         acc = max(acc, -me.b_max)

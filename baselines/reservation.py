@@ -28,7 +28,7 @@ old; `buffer` covers it. Vehicles that differ or follow an unknown law are refus
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -87,8 +87,10 @@ class Reservation:
 
         A period below the host's step is refused, too.
         """
+        from baselines.promises import PromiseSession  # which builds on this module
+
         self.covers.check(self.name, site.vehicle)
-        return ReservationSession(self, site)
+        return PromiseSession(self, site) if site.channel else ReservationSession(self, site)
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,8 +147,13 @@ class Manager:
         self._rows = site.intersection.movements.rows
         self._buffer = math.ceil(buffer / site.dt - 1e-6)
 
-    def predict(self, seen: Observed, now: int) -> Slot | None:
-        """A vehicle's passage behind the holders ahead of it in both lanes; None if it hits one."""
+    def predict(
+        self, seen: Observed, now: int, held: int = 0, without: Collection[int] = ()
+    ) -> Slot | None:
+        """A vehicle's passage behind the holders ahead of it in both lanes; None if it hits one.
+
+        It may drive on after `held` steps; holders in `without` do not enter its exit lane.
+        """
         p = self._rows[seen.lane][seen.manoeuvre]
         way = self._ways[p]
         others = [slot for slot in self.slots.values() if slot.vehicle != seen.id]
@@ -159,12 +166,13 @@ class Manager:
         exit_lane = [
             slot.leader(now, shift=way.crossing - self._ways[slot.movement].crossing)
             for slot in rivals
-            if self._ways[slot.movement].exit_arm == way.exit_arm
+            if self._ways[slot.movement].exit_arm == way.exit_arm and slot.vehicle not in without
         ]
         me = self._types[seen.type]
         motion = predict(
-            self._law, me, way, -seen.distance, seen.speed, lane=lane, exit_lane=exit_lane
-        )
+            self._law, me, way, -seen.distance, seen.speed, lane=lane, exit_lane=exit_lane,
+            held=held,
+        )  # fmt: skip
         if motion is None:
             return None
         s, v, hard = motion
@@ -229,10 +237,14 @@ class ReservationSession:
             if vehicle not in manager.slots:
                 self._requests.setdefault(vehicle)
         self._requests = {v: None for v in self._requests if v in seen and v not in manager.slots}
-        commands += [Go(v) for v in self._grant(seen, ahead, now)]
+        commands += [self._permit(v) for v in self._grant(seen, ahead, now)]
         if seen:
             commands.append(Wake(view.time + self._period))
         return commands
+
+    def _permit(self, vehicle: int) -> Command:
+        """The command that gives a new holder the right of way."""
+        return Go(vehicle)
 
     def _revoke(self, seen: dict[int, Observed], ahead: dict[int, int], now: int) -> Iterator[int]:
         """Renew outdated reservations; return the ids of vehicles that lose theirs.

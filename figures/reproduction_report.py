@@ -159,7 +159,7 @@ def _collisions(studies: Iterable[Results]) -> str:
     for results in studies:
         for point, rows in _cells(results):
             if count := int(rows["collisions"].sum()):
-                hours = len(rows) * results.effort.horizon / 3600.0
+                hours = float(rows["horizon_s"].sum()) / 3600.0
                 where = f"{style.look(point.series).label}, {point.where}, {point.density:g}"
                 where = f"{results.study.name}: {where} veh/h/lane"
                 lines.append(f"- {where}: {count} in {hours:.1f} h")

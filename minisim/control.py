@@ -16,8 +16,10 @@ from collections.abc import Callable, Iterable, Mapping
 from copy import copy
 from dataclasses import dataclass
 from functools import cache, cached_property
+from types import MappingProxyType
 from typing import Any, NamedTuple, Protocol, TypeGuard, TypeVar, cast, runtime_checkable
 
+from minisim.channel import Channel
 from minisim.errors import InputError, instance, integer, number, printable, told
 from minisim.fleet import Fleet
 from minisim.inflow import Inflow
@@ -72,6 +74,9 @@ class Site:
         "expected by time of the run; none if it is always `demand`", Inflow,
         optional=True, default=None,
     )  # fmt: skip
+    channel: Channel = part(
+        "what messages between vehicles and a controller go through", Channel, default=Channel()
+    )
 
     @property
     def vehicle(self) -> VehicleType:
@@ -138,8 +143,15 @@ class Site:
 
     def with_seed(self, seed: int) -> Site:
         """The same site in a run with another seed; only the seed is checked."""
+        return self._with("seed", integer("seed", seed, low=0))
+
+    def with_channel(self, channel: Channel) -> Site:
+        """The same site with messages through this channel."""
+        return self._with("channel", channel)
+
+    def _with(self, name: str, value: object) -> Site:
         twin = copy(self)
-        object.__setattr__(twin, "seed", integer("seed", seed, low=0))
+        object.__setattr__(twin, name, value)
         return twin
 
     def expected(self, start: float, end: float) -> tuple[float, ...]:
@@ -203,15 +215,26 @@ def can_stop(vehicle: Observed, deceleration: float) -> bool:
     return speed * speed / (2.0 * deceleration) + COMMIT_MARGIN <= distance
 
 
+class Report(NamedTuple):
+    """The latest message from a vehicle."""
+
+    time: float  # when it was sent [s]
+    holds: bool  # whether the vehicle then had the right of way
+
+
 class View(NamedTuple):
     """What the session is shown at a wake-up.
 
     It has every vehicle from `Plan.sight` before the junction until its rear bumper has left it
     and its front is `Plan.reach` past the entry.
+
+    If messages fail (`minisim.link`), it has what they told: a vehicle is where it was when it sent
+    the latest, and stays until one says that it has left.
     """
 
     time: float  # [s]
     vehicles: tuple[Observed, ...]  # by lane, then front to back
+    reports: Mapping[int, Report] = MappingProxyType({})  # by vehicle; empty if no message fails
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,6 +242,18 @@ class Go:
     """Give one vehicle the right of way: its hold line no longer holds it."""
 
     vehicle: int
+
+
+@dataclass(frozen=True, slots=True)
+class Reserve(Go):
+    """Give one vehicle the right of way from `time` on, as long as it keeps to a passage.
+
+    For sessions whose messages fail (`minisim.link`). It is void if it arrives later than `time`.
+    The vehicle gives it up by itself once `keeps(vehicle, time)` is false, if it can still stop.
+    """
+
+    time: float  # [s]
+    keeps: Callable[[Observed, float], bool]
 
 
 @dataclass(frozen=True, slots=True)
@@ -423,15 +458,20 @@ def cover_of(controller: object) -> Cover:
 
 @declared
 class Radio:
-    """How large the messages are that vehicles and a controller send each other.
+    """The messages that vehicles and a controller send each other.
 
-    A vehicle sends one for each view that shows it, a controller one for each command to a vehicle.
+    If none fails, a vehicle sends one for each view that shows it, and a controller one for each
+    command to a vehicle. If some fail, `minisim.link` says who sends what.
     """
 
     # The smaller and more frequent of the two messages by which 3GPP compares radio links between
     # vehicles (TR 36.885, release 14, annex A.1.5, periodic traffic).
     state: int = whole("where a vehicle is and how fast, in bytes", default=190, low=1)
     command: int = whole("what it shall do, in bytes", default=190, low=1)
+    # There, too: 10 messages per second, the most for which 3GPP TS 22.185 asks.
+    interval: float = real(
+        "from a message to the next one, if messages fail", "s", low=0.01, high=10, default=0.1
+    )
 
 
 @runtime_checkable
@@ -440,8 +480,8 @@ class Controller(Protocol):
 
     It promises that no `ORDINARY` vehicles collide and that each is served. A controller that
     promises less or more has an attribute `covers`, a `Cover`. One that vehicles talk to has an
-    attribute `radio`, a `Radio`; without it, nothing is sent. One that shows lights, but does not open
-    lanes, has an attribute `lights` of True, so that its junction counts as signalised.
+    attribute `radio`, a `Radio`; without it, nothing is sent. One that shows lights, but does not
+    open lanes, has an attribute `lights` of True, so that its junction counts as signalised.
     """
 
     @property

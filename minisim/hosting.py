@@ -121,7 +121,7 @@ class Hosted:
         """
         try:
             began = time.thread_time_ns() if self.timed else 0
-            commands = _listed(self.session.decide(view))
+            commands = listed(self.session.decide(view))
             if self.timed:
                 self.times.append(time.thread_time_ns() - began)
             self.exchange["decisions"] += 1
@@ -129,7 +129,7 @@ class Hosted:
             if 0.0 < view.time <= self.scenario.warmup and keeps(self.session, Counting):
                 self.before.update(self.session.counts)
             for command in commands:
-                _check_command(command, tick, self.site, len(self.arrivals))
+                check_command(command, tick, self.site, len(self.arrivals))
                 self.exchange[type(command).__name__] += 1
             if view.time < self.scenario.warmup:
                 self.exchange.clear()
@@ -246,13 +246,14 @@ def _blame(
     """The error that says where a controller's own code failed, and why."""
     if isinstance(error, MinisimError) and not isinstance(error, InputError):
         raise error
-    module = sys.modules.get(type(of).__module__)
+    module = sys.modules.get(of.__module__)
     folder = Path(getattr(module, "__file__", None) or "/").parent
     why = error if isinstance(error, InputError) else told(error, folder)
     return ControllerError(f"controller {name_of(controller)!r}{when}: {why}")
 
 
-def _listed(answer: object) -> list[Command]:
+def listed(answer: object) -> list[Command]:
+    """A session's answer as a list; raises `InputError` if it is none."""
     if isinstance(answer, list):  # as nearly always, and the other test takes longer
         return answer
     if isinstance(answer, Iterable):
@@ -269,9 +270,10 @@ def checked_window(window: object) -> tuple[float, float]:
     return start, end if end == math.inf else number("end of record_window [s]", end, low=start)
 
 
-def _check_command(command: Command, tick: int, site: Site, vehicles: int) -> None:
+def check_command(command: Command, tick: int, site: Site, vehicles: int | None = None) -> None:
+    """Raise `InputError` for what is not a command, or one that cannot be carried out at `tick`."""
     if isinstance(command, TO_VEHICLES):
-        integer("vehicle", command.vehicle, low=0, high=vehicles - 1)
+        integer("vehicle", command.vehicle, low=0, high=vehicles and vehicles - 1)
         if isinstance(command, Advise) and command.speed != math.inf:
             number("advised speed [m/s]", command.speed, low=0)
         if isinstance(command, Brake):

@@ -15,7 +15,7 @@ import numpy as np
 from minisim.errors import choice, integer
 
 #: The place of a name is its spawn key: append only.
-STREAMS = ("arrivals", "manoeuvres", "perception", "drivers", "humans", "types")
+STREAMS = ("arrivals", "manoeuvres", "perception", "drivers", "humans", "types", "messages")
 
 
 def stream(seed: int, name: str) -> np.random.Generator:

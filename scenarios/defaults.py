@@ -19,6 +19,9 @@ AXES: dict[str, Any] = {
     "demand": None,
     "controller": "dim",
     "humans": 0.0,
+    "latency": 0.0,
+    "jitter": 0.0,
+    "loss": 0.0,
     "seeds": 10,
 }
 

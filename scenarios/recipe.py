@@ -10,9 +10,11 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from dim import Dim, Mixed
+from minisim.channel import Channel
 from minisim.control import Controller, as_controller
 from minisim.errors import InputError, show
 from minisim.hosting import REACTIONS
+from minisim.link import Linked
 from minisim.names import name_of
 from minisim.parameters import Spelled, Takes, checked, declared, part, real, text, whole, word
 from minisim.results.metric import Metric
@@ -36,7 +38,8 @@ def _controller(title: str, value: Any) -> Any:
 class Recipe:
     """One run: what is simulated, which controller decides, and the seed.
 
-    `InputError` for a value that is not allowed, or humans with a controller other than DIM.
+    `InputError` for a value that is not allowed, humans with a controller other than DIM, or
+    messages that fail with a controller that sends none.
     """
 
     scenario: Scenario = part("what is simulated", Scenario)
@@ -49,6 +52,9 @@ class Recipe:
         "share of human drivers among the vehicles of DIM",
         low=0, high=1, default=0.0, label="share of humans",
     )  # fmt: skip
+    latency: float = real("of messages (`minisim.channel`)", "s", low=0, high=60, default=0.0)
+    jitter: float = real("how much longer they may take", "s", low=0, high=60, default=0.0)
+    loss: float = real("share of messages that never arrive", low=0, high=1, default=0.0)
     label: str = text("what rows call the controller; if empty, its name", empty=True, default="")
     on_collision: str = word(
         "a collision ends the run, is noted, or removes a vehicle (SUMO, cruise control)",
@@ -68,13 +74,16 @@ class Recipe:
                 f"humans drive among vehicles of DIM (the controller dim), not with "
                 f"{name_of(self.controller)!r}"
             )
+        if channel := Channel(self.latency, self.jitter, self.loss):
+            Linked(self.controller, channel)  # refuses a controller that sends no messages
 
     @property
     def driven(self) -> Controller:
-        """The controller of the run, with its human drivers."""
+        """The controller of the run, with its human drivers or messages that fail."""
         if self.humans and isinstance(self.controller, Dim):
             return Mixed(self.controller, self.humans)
-        return self.controller
+        channel = Channel(self.latency, self.jitter, self.loss)
+        return Linked(self.controller, channel) if channel else self.controller
 
     @property
     def name(self) -> str:

@@ -32,6 +32,8 @@ def _sent(run: Run, sizes: Callable[[Radio], tuple[int, int]]) -> int:
     if radio is None:
         return 0
     state, command = sizes(radio)
+    if (states := run.counts.get("states_sent")) is not None:  # by `minisim.link`
+        return int(states) * state + int(run.counts["orders_sent"]) * command
     told = sum(run.exchange.get(kind, 0) for kind in TO_VEHICLES)
     return run.exchange.get("shown", 0) * state + told * command
 

@@ -208,7 +208,7 @@ TABLE: Final = (
     Metric(
         "messages", exchange.messages, title="messages",
         meaning="between vehicles and controller; DIM and signals send none",
-        equation="vehicles in all views + commands to vehicles (minisim.control.Radio)",
+        equation="vehicles in all views + commands to vehicles; or as in minisim.link, lost or not",
     ),
     Metric(
         "message_bytes", exchange.message_bytes, "B", title="messages",

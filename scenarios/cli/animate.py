@@ -27,6 +27,9 @@ def animate(
     ],
     controller: options.ControllerName = "dim",
     humans: options.Humans = 0.0,
+    latency: options.Latency = 0.0,
+    jitter: options.Jitter = 0.0,
+    loss: options.Loss = 0.0,
     begin: Annotated[float, typer.Option("--from", metavar="S", help="When to begin.")] = 300.0,
     seconds: Annotated[float, typer.Option(metavar="S", help="Simulated time to show.")] = 60.0,
     fps: Annotated[float, typer.Option(help="At most one per step, and 50 in a .gif.")] = 10.0,
@@ -65,7 +68,7 @@ def animate(
     number("--seconds", seconds, above=0, high=min(3600.0, junction.horizon - begin))
     frame_times(begin, seconds, fps, junction.profile.dt)
     who = controller_named(controller, profile)
-    recipe = Recipe(junction, who, seed, humans, on_collision="record")
+    recipe = Recipe(junction, who, seed, humans, latency, jitter, loss, on_collision="record")
     end = begin + seconds
     result = recipe.run(simulate, until=end, record="all", record_window=(begin, end))
     with bar("drawing") as progress:

@@ -30,6 +30,9 @@ def run(
     scenario: options.ScenarioName,
     controller: options.ControllerName = "dim",
     humans: options.Humans = 0.0,
+    latency: options.Latency = 0.0,
+    jitter: options.Jitter = 0.0,
+    loss: options.Loss = 0.0,
     density: options.Density = None,
     split: options.Split = None,
     turns: options.Turns = None,
@@ -96,7 +99,7 @@ def run(
         profile=profile, side=side, node=node, horizon=horizon, warmup=warmup,
     )  # fmt: skip
     recipe = Recipe(
-        junction, controller_named(controller, profile), seed, humans,
+        junction, controller_named(controller, profile), seed, humans, latency, jitter, loss,
         on_collision=on_collision, metrics=(*asked, *(() if no_safety else SAFETY)),
     )  # fmt: skip
     recording: dict[str, Any] = {"record": None if fcd is None and trajectories is None else "all"}

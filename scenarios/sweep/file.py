@@ -7,6 +7,7 @@
     controller = ["dim", "fixed-time"]
     # fleet = { car = 0.9, bus = 0.1 }  # shares of vehicle types, perhaps with unit = "pcu"
     # humans = [0, 0.2]                 # with controllers of DIM only
+    # loss = [0, 0.1]                   # of messages, with latency and jitter [s]
     # arrivals = "count.csv"            # a table to replay instead of density, split and turns,
     # demand = "day.toml"               # or demand by time of day (`minisim.demandfile`)
     # start = "07:00"                   # from this time of day on
@@ -66,6 +67,9 @@ MAX_RUNS = 1_000_000
 
 #: Keys of shares, written "4:3:2:1" or [4, 3, 2, 1]; a list may hold several of both forms.
 SHARES = ("split", "turns")
+
+#: Keys that say how a controller's vehicles are driven and told.
+DRIVING = ("humans", "latency", "jitter", "loss")
 
 #: Keys of a scenario's table.
 JUNCTION = (
@@ -148,16 +152,21 @@ def _recipes(block: Mapping[str, Any], folder: Path) -> Iterator[Recipe]:
     single = {key: block.get(key, default) for key, default in SINGLE.items()}
     reaction = choice("on_collision", single.pop("on_collision"), hosting.ON_COLLISION)
     metrics = metrics_named(single.pop("metrics"))
-    controllers, shares, _ = (axes.pop(key) for key in ("controller", "humans", "seeds"))
+    del axes["seeds"]
+    controllers = axes.pop("controller")
+    drivings = [*product(*(axes.pop(key) for key in DRIVING))]
     for values in product(*axes.values()):
         scenario = _scenario({**dict(zip(axes, values, strict=True)), **single}, folder)
-        for given, share in product(controllers, shares):
+        for given, driving in product(controllers, drivings):
             with _at("controller"):
                 table = _table(given)
                 label = table.pop("label", "")
                 controller = controller_named(table, scenario.profile)
             for seed in seeds:
-                yield Recipe(scenario, controller, seed, share, label, reaction, metrics)
+                yield Recipe(
+                    scenario, controller, seed, label=label, on_collision=reaction,
+                    metrics=metrics, **dict(zip(DRIVING, driving, strict=True)),
+                )  # fmt: skip
 
 
 def _scenario(chosen: dict[str, Any], folder: Path) -> Scenario:

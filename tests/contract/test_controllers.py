@@ -15,6 +15,7 @@ import minisim
 from baselines import V2IC, Actuated, Adaptive, AllWayStop, FixedTime, MaxPressure, Reservation
 from dim import AsRunDim, Dim, Mixed, Monitor, NoisyPerception
 from minisim.arrivals import Arrivals
+from minisim.channel import Channel
 from minisim.control import (
     Advise,
     Brake,
@@ -34,6 +35,7 @@ from minisim.control import (
     cover_of,
 )
 from minisim.errors import ControllerError, InputError
+from minisim.link import Linked, radio_of
 from minisim.results.run import Run
 from minisim.testing import ContractError, check_commands, check_controller, drained, small_scenario
 from minisim.vehicle import VehicleType
@@ -61,8 +63,15 @@ MORE: tuple[Controller, ...] = (
     Reservation(reach=120.0, buffer=0.0, period=0.2),
 )
 
+#: Those whose messages may fail, with some that do.
+FAILING = tuple(
+    Linked(it, Channel(latency=0.2, jitter=0.2, loss=0.3))
+    for it in map(controller_named, SAFE)
+    if radio_of(it)
+)
+
 #: Everything that promises no collision; a new controller of the table is among them.
-CONTROLLERS = (*map(controller_named, SAFE), *MORE)
+CONTROLLERS = (*map(controller_named, SAFE), *MORE, *FAILING)
 
 
 @pytest.mark.parametrize("controller", CONTROLLERS, ids=lambda c: c.name)

@@ -19,6 +19,7 @@ from tests.builders import share
 
 FLAGS = """
 --controller -c --humans --density -d --split --turns --profile --side --bearings --seed --horizon
+--latency --jitter --loss
 --warmup --on-collision --no-safety --metrics --by --json --arrivals --trips --trajectories --fcd
 --host --order --clearance --csv --plot --out -o --seeds --jobs --export --start --seconds --fps
 --only --store --list --quick --help --version --gate --commit --priorities --counterexample

@@ -21,9 +21,10 @@ from scenarios.sweep import Store
 from tests.builders import share
 
 NOISY = "dim:perception=noisy(intent_error=0.25,kind=symmetric)"
-CONTROLLERS = ("dim", "dim:gate=harmonious", NOISY, "fixed-time", "all-way-stop")
+CONTROLLERS = ("dim", "dim:gate=harmonious", NOISY, "fixed-time", "all-way-stop", "v2ic")
 #: All metrics that give the same number twice; the counts of a tally are not asked for.
 ASKED = [it.name for it in METRICS.values() if it.needs not in ("decisions", "counts")]
+FAULTS = ("latency", "jitter", "loss")
 TALLY = {"crossings", "false_grants", "disagreement_s", "deadlock_s"}
 
 
@@ -46,10 +47,12 @@ def said(draw: st.DrawFn) -> dict[str, Any]:
     """A recipe as a TOML file has it; the keys are those of the command line."""
     controller = draw(st.sampled_from(CONTROLLERS))
     humans = draw(st.sampled_from([0.0, 0.3])) if controller.startswith("dim") else 0.0
+    fails = st.sampled_from([0.0, 0.3]) if controller == "v2ic" else st.just(0.0)
     return {
         "scenario": draw(st.sampled_from(["three-way", "four-way"])),
         "controller": controller,
         "humans": humans,
+        **{name: draw(fails) for name in FAULTS},
         "density": draw(st.sampled_from([150.0, 400.0])),
         "turns": "uniform",
         "profile": draw(st.sampled_from(["paper", "fair"])),
@@ -70,6 +73,7 @@ ERRING = {
 @example({**ERRING, "humans": 0.0})
 @example({**ERRING, "humans": 0.3})
 @example({**ERRING, "controller": "dim", "humans": 0.3, "horizon": 60.0, "warmup": 20.0, "seed": 3})
+@example({**ERRING, "controller": "reservation", "latency": 0.2, "jitter": 0.1, "loss": 0.3})
 @share(0.05)
 def test_the_same_recipe_has_the_same_numbers_everywhere(said: dict[str, Any]) -> None:
     options = {**said, "on-collision": "record"}
@@ -93,7 +97,8 @@ def test_the_same_recipe_has_the_same_numbers_everywhere(said: dict[str, Any]) -
     )  # fmt: skip
     recipe = Recipe(
         drawn, controller_named(said["controller"], said["profile"]), said["seed"],
-        said["humans"], on_collision="record", metrics=ASKED,
+        on_collision="record", metrics=ASKED,
+        **{name: said[name] for name in ("humans", *FAULTS) if name in said},
     )  # fmt: skip
     run = recipe.run()
     ours = flat(run.summary(recipe.metrics))
@@ -101,5 +106,5 @@ def test_the_same_recipe_has_the_same_numbers_everywhere(said: dict[str, Any]) -
     assert printed == json.loads(json.dumps(ours))
     assert {key: None if row[key] != row[key] else row[key] for key in ours} == ours
     assert (printed.keys() >= TALLY) is (said["controller"] == NOISY)
-    kinds = set(run.trips["kind"]) if said["humans"] > 0.0 else set()
+    kinds = set(run.trips["kind"]) if said.get("humans") else set()
     assert any(key.startswith("kinds_human_") for key in printed) is ("human" in kinds)

@@ -32,6 +32,9 @@ ControllerName = Annotated[
     str, option("What decides: dim, dim:gate=harmonious, …", "SPEC", "--controller", "-c")
 ]
 Humans = Annotated[float, option("Human drivers among DIM's, 0 … 1.", "SHARE")]
+Latency = Annotated[float, option("Delay of messages to and from vehicles.", "S")]
+Jitter = Annotated[float, option("How much longer they may take.", "S")]
+Loss = Annotated[float, option("Share of messages that get lost, 0 … 1.", "SHARE")]
 Density = Annotated[
     float | None, option("Mean inflow per lane; 350 by default.", "VEH/H", "--density", "-d")
 ]

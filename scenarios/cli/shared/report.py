@@ -66,7 +66,11 @@ def run_parts(
 
 def _counted(name: str, value: float) -> str:
     metric = METRICS.get(name)
-    return f"{metric.title} {value:g} {metric.unit}".rstrip() if metric else f"{name} {value:g}"
+    return (
+        f"{metric.title} {value:g} {metric.unit}".rstrip()
+        if metric
+        else f"{name.replace('_', ' ')} {value:g}"
+    )
 
 
 def _run_table(summary: Mapping[str, Any], metrics: Sequence[Metric], by: str) -> Table:

@@ -65,7 +65,8 @@ def missing_note(*results: Results, wanted: Callable[[Point], bool] = lambda _: 
     fewer = [f"{name} has {n.made}" for name, n in runs.items() if 0 < n.made < n.wanted]
     missing = [name for name, count in runs.items() if not count.made]
     shown = 1 if fewer and missing else 3  # there is room for two lines
-    text = f"{effort.warning}{_extent([*runs.values()])}, {effort.horizon:g} s each."
+    horizon = min(effort.horizon, *(each.study.longest for each in results))
+    text = f"{effort.warning}{_extent([*runs.values()])}, {horizon:g} s each."
     if fewer:
         text += f"  Fewer runs: {_listed(fewer, shown)}."
     if missing:

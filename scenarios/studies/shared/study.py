@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -33,13 +34,14 @@ class Study:
     #: Answers the question from the results, in a few sentences for the head of the report.
     verdict: Callable[[Results], str] | None = None
     about_collisions: bool = False  # its figures show them, so the report does not list them
+    longest: float = math.inf  # most simulated time of a run, if more would cost too much [s]
 
     def runs(
         self, seeds: int, horizon: float = 3600.0, points: Sequence[Point] = ()
     ) -> list[tuple[Point, Recipe]]:
         """The runs with seeds 1 … `seeds` of `points`, or of all points, point by point."""
         return [
-            (point, point.recipe(seed, horizon))
+            (point, point.recipe(seed, min(horizon, self.longest)))
             for point in points or self.points
             for seed in range(1, min(seeds, self.few.get(point.series, seeds)) + 1)
         ]
@@ -60,7 +62,7 @@ class Study:
 
     def extent(self, effort: Effort) -> str:
         """The seeds and the horizon, in words."""
-        return f"the seeds 1 … {effort.seeds} over {effort.horizon:g} s"
+        return f"the seeds 1 … {effort.seeds} over {min(effort.horizon, self.longest):g} s"
 
 
 class Runs(NamedTuple):

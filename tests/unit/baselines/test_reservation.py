@@ -14,7 +14,17 @@ import minisim
 from baselines import Reservation
 from baselines.prediction import Leader, courses, law_of, predict
 from baselines.reservation import ReservationSession, Slot
-from minisim.control import Command, Go, Hold, Observed, Session, Site, Unregulated, View, Wake
+from minisim.control import (
+    Command,
+    Go,
+    Hold,
+    Observed,
+    Session,
+    Site,
+    Unregulated,
+    View,
+    Wake,
+)
 from minisim.errors import InputError
 from minisim.junction.partings import branch
 from minisim.laws import traits_of
@@ -22,7 +32,7 @@ from minisim.testing import SmallScenario
 from minisim.vehicle import VehicleType
 from scenarios import AS_RUN, FAIR, PAPER, four_way
 from scenarios.profiles import Profile
-from tests.builders import ScriptedSession, replayed, seen
+from tests.builders import Scripted, ScriptedSession, replayed, seen
 
 FAIR_FOUR = four_way(100, profile="fair")
 SITE = FAIR_FOUR.site(1)
@@ -269,3 +279,25 @@ def test_vehicles_that_cannot_be_predicted_are_refused(profile: Profile, got: st
 
 def test_by_default_they_ask_as_late_as_they_can() -> None:
     assert session().plan.sight == pytest.approx(14.0**2 / 9.0 + 7.0)
+
+
+@pytest.mark.parametrize("model", ["idm", "iidm", "krauss"])
+@pytest.mark.parametrize("released", [33.0, 34.5, 50.0])
+def test_a_vehicle_that_is_held_for_a_while_is_predicted(model: str, released: float) -> None:
+    """Let go before it brakes for its line, while it does, and as it stands there."""
+    profile = Profile(name="test", vehicle=VehicleType(model=model), speed_limit=14.0)
+    scenario = replayed(four_way(profile=profile), (0.0, 0, 2), horizon=120.0)
+    first = [Wake(released)]
+
+    def answer(view: View) -> list[Command]:
+        return [Go(0)] if view.time else [*first]
+
+    run = minisim.simulate(scenario, Scripted(answer), record="all")
+    track = run.trace[run.trace["tick"] >= 320]
+    law, me, way = law_of(run.site), traits_of(run.site.vehicle), courses(run.site)[1]
+    held = round(released / run.site.dt) - 320
+    motion = predict(law, me, way, track["s"][0] - ENTRY, track["v"][0], held=held)
+    assert motion is not None
+    assert np.allclose(motion.s[: len(track)], track["s"] - ENTRY, atol=1e-6)
+    slowest = {33.0: 14.0, 34.5: 8.5, 50.0: 0.0}[released]
+    assert track["v"].min() == pytest.approx(slowest, abs=0.7)

@@ -9,11 +9,13 @@ from typing import Any
 
 import pytest
 
-from baselines import AllWayStop, FixedTime
+from baselines import V2IC, AllWayStop, FixedTime
 from dim import AsRunDim, Dim, Mixed
 from minisim import simulate
+from minisim.channel import Channel
 from minisim.control import Session, Site, Unregulated
 from minisim.errors import InputError
+from minisim.link import Linked
 from scenarios import four_way
 from scenarios.recipe import Recipe
 
@@ -64,6 +66,18 @@ def test_humans_drive_among_vehicles_of_dim() -> None:
     assert Recipe(SHORT, AllWayStop()).driven == AllWayStop()
     with pytest.raises(InputError, match=r"among vehicles of DIM .* not with 'all-way-stop'"):
         Recipe(SHORT, AllWayStop(), humans=0.5)
+
+
+def test_messages_fail_only_where_some_are_sent() -> None:
+    failing = Recipe(SHORT, V2IC(), latency=0.1, jitter=0.2, loss=0.3)
+    assert failing.driven == Linked(V2IC(), Channel(0.1, 0.2, 0.3))
+    assert failing.name == "v2ic+latency=0.1+jitter=0.2+loss=0.3"
+    assert Recipe(SHORT, V2IC(), loss=0).driven == V2IC()
+    for silent in (Dim(), FixedTime(), AllWayStop()):
+        with pytest.raises(InputError, match=f"such as v2ic; {silent.name} sends none"):
+            Recipe(SHORT, silent, loss=0.3)
+    with pytest.raises(InputError, match="loss must be at least 0 and at most 1, got 2"):
+        Recipe(SHORT, V2IC(), loss=2)
 
 
 def test_without_a_label_it_is_called_as_its_controller() -> None:

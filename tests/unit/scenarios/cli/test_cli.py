@@ -139,6 +139,16 @@ def test_run_prints_every_lane_and_the_total(capsys: Captured) -> None:
     assert all(word in out for word in heads)
 
 
+def test_run_counts_the_messages_that_get_lost(capsys: Captured) -> None:
+    failing = ("--loss", "0.4", "--latency", "0.1", "--jitter", "0.1", "-c", "v2ic")
+    arguments = ("run", "four-way", *SHORT, "-p", "fair", *failing)
+    printed = answer(capsys, *arguments)
+    assert printed["controller"] == "v2ic+latency=0.1+jitter=0.1+loss=0.4"
+    sent = printed["states_sent"] + printed["orders_sent"]
+    assert 0.35 < printed["messages_lost"] / sent < 0.45
+    assert f"messages lost {printed['messages_lost']}" in ok(capsys, *arguments)
+
+
 def test_run_tells_humans_from_the_others(capsys: Captured) -> None:
     arguments = ("run", "four-way", *SHORT, "-p", "fair", "--humans", "0.4")
     printed, rows = answer(capsys, *arguments), lines_of(ok(capsys, *arguments))

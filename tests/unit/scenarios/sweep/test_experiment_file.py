@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from baselines import FixedTime
+from baselines import V2IC, FixedTime
 from dim import Dim, Zones
 from minisim.errors import FileError, InputError
 from minisim.recorded import read_arrivals, write_arrivals
@@ -47,6 +47,10 @@ SAID = [
     (
         'humans = [0, 0.25]\nseeds = [1]\ncontroller = "dim:gate=harmonious"\n',
         [Recipe(four_way(), HARMONIOUS, 1), Recipe(four_way(), HARMONIOUS, 1, 0.25)],
+    ),
+    (
+        'loss = [0, 0.25]\nlatency = 0.1\nseeds = [1]\ncontroller = "v2ic"\n',
+        [Recipe(four_way(), V2IC(), 1, latency=0.1, loss=loss) for loss in (0, 0.25)],
     ),
     ('seeds = [1]\nsplit = "(4,3,2,1)"', [Recipe(four_way(split=(4, 3, 2, 1)), Dim(), 1)]),
     (
@@ -179,6 +183,9 @@ WRONG = [
     ("density = [1, 2, 3]\nseeds = 1000000", r"3000000 runs are more than"),
     ("horizon = [1]", r"horizon"),
     ('humans = 0.1\ncontroller = "fixed-time"', r"humans .*not with 'fixed-time'"),
+    ("loss = [0, 0.1]", r"toml: messages can fail only with .* such as v2ic; dim sends none"),
+    ('loss = 2\ncontroller = "v2ic"', r"toml: loss must be at least 0 and at most 1, got 2"),
+    ("los = 0.1", r"unknown key 'los'.*did you mean 'loss'"),
     ('metrics = ["min_pet"]', r"unknown metric 'min_pet'.*did you mean 'min_pet_s'"),
     ("metrics = 3", r"metrics must be a sequence"),
     ('on_collision = "ignore"', r"unknown on_collision 'ignore'"),
