@@ -216,6 +216,7 @@ class DimSession:
             sight=zones.yellow_start + SIGHT_MARGIN,
             lanes_open=False,
         )
+        self.gate = dim.gate  #: the one in force
         self._start = zones.yellow_start + ROUNDING
         self._ranks = ranking_of(dim.priorities, site, zones, dim.turn_time, dim.sensor_range)
         see = dim.perception.start(site)
@@ -249,7 +250,7 @@ class DimSession:
             if sight is not seen or percept is None:  # vehicles that see the same read the same
                 seen, percept = sight, self.reader.read(sight)
             had = agent.right_of_way
-            goes = agent.decide(percept, table)
+            goes = agent.decide(percept, table, self.gate)
             if self._monitors is not None:
                 goes = self._monitors.patience.goes(view, sight, ego, goes, table.priorities)
                 agent.right_of_way = goes

@@ -99,13 +99,13 @@ class Readings:
         self.turns = turns(site.intersection)
         self._silent = (humans.unsignalled[0], 1.0, humans.unsignalled[1])
         self.drivers = drivers
-        self._rows = site.intersection.movements.rows
+        self.rows = site.intersection.movements.rows
         # Beyond the parting of two ways, a vehicle's place shows which of them it takes.
         self._parting = parting(site.intersection, CLEARANCE).tolist()
 
     def index(self, vehicle: Observed) -> int:
         """The index of its true movement."""
-        return self._rows[vehicle.lane][vehicle.manoeuvre]
+        return self.rows[vehicle.lane][vehicle.manoeuvre]
 
     def possible(self, vehicle: Observed, trust: str) -> list[int]:
         """Movements, by index, that a vehicle might take, as far as others can tell.
@@ -114,7 +114,7 @@ class Readings:
         """
         movement = self.index(vehicle)
         parts, inside = self._parting[movement], -vehicle.distance
-        alike = [q for q in self._rows[vehicle.lane][1:] if inside <= parts[q]]
+        alike = [q for q in self.rows[vehicle.lane][1:] if inside <= parts[q]]
         driver = self.drivers[vehicle.lane, vehicle.rank]
         turn = self.turns[movement]
         if driver.human:

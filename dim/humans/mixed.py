@@ -22,18 +22,17 @@ J3134). Otherwise each would let the other go first.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 from dim.controller import Dim, DimSession
 from dim.humans.drivers import TRUSTS, Drivers, Humans, Readings
-from dim.perception import ROUNDING, UNKNOWN
+from dim.humans.queue import Courtesy, Queue
+from dim.perception import ROUNDING
 from minisim.control import HALTING, Command, Go, Observed, Plan, Session, Site, View, Wake
 from minisim.junction.conflicts import clearing_distances
-from minisim.junction.movements import Movements
 from minisim.parameters import declared, part, real, word
 
-LINE = 1.0  #: a driver stands at the line when its front is at most this far before it [m]
 LOOK = 0.2  #: how often a driver at the junction looks at the others [s]
 
 
@@ -68,15 +67,15 @@ class MixedSession:
     def __init__(self, mixed: Mixed, site: Site) -> None:
         drivers = self._drivers = Drivers(mixed.humans, mixed.share, site.seed)
         readings = Readings(mixed.humans, site, drivers)
-        takes = _caution(mixed, site, readings)
-        self._dim = DimSession(mixed.dim, site, lambda v: not drivers[v.lane, v.rank].human, takes)
-        self._humans = _Humans(mixed, site, readings)
-        plan = self._dim.plan
-        self.plan: Plan = replace(
-            plan,
-            marks=tuple(dict.fromkeys((*plan.marks, 0.0))),  # at the entry another becomes first
-            sight=min(max(plan.sight, self._humans.sight), site.intersection.approach_length),
+        self._queue, self._gate = Queue(mixed.dim.zones, drivers), mixed.dim.gate
+        self._dim = DimSession(
+            mixed.dim, site, lambda v: not self._queue.is_human(v), lambda *it: courtesy(*it)
         )
+        courtesy = Courtesy(__import__("os").environ.get("TRUST", mixed.trust), readings, self._dim.rules.table.matrix, self._queue)
+        self._humans = _Humans(mixed, site, readings, self._queue)
+        plan = self._dim.plan
+        marks = dict.fromkeys((*plan.marks, 0.0))  # at the entry another becomes first
+        self.plan: Plan = replace(plan, marks=tuple(marks))
 
     def kind(self, lane: int, rank: int) -> str:
         """ "human" or "automated"."""
@@ -89,104 +88,64 @@ class MixedSession:
 
     def decide(self, view: View) -> Iterable[Command]:
         """Let all vehicles decide, from the same view."""
+        self._queue.look(view)
+        self._dim.gate = "harmonious" if self._queue.people or any(v.distance < 0.0 and self._queue.is_human(v) for v in view.vehicles) else self._gate
         commands = [*self._dim.decide(view), *self._humans.decide(view)]
         wakes = [command.time for command in commands if isinstance(command, Wake)]
         others = [command for command in commands if not isinstance(command, Wake)]
+        import os
+        if os.environ.get("LOOKS") and any(v.distance < 0.0 and self._queue.is_human(v) for v in view.vehicles):
+            wakes.append(view.time + LOOK)
         return [*others, Wake(min(wakes))] if wakes else others
 
 
-def _caution(mixed: Mixed, site: Site, readings: Readings) -> Callable[[View, View], View]:
-    """How a DIM vehicle interprets what it has seen of a true view."""
-    drivers, movements = readings.drivers, site.intersection.movements
-    start = mixed.dim.zones.yellow_start + ROUNDING
-    latest: list[View] = []  # what was seen last, and how it was interpreted
-
-    def take(view: View, seen: View) -> View:
-        if not latest or latest[0] is not seen:
-            ways = {
-                v.id: readings.possible(v, mixed.trust)
-                for v in view.vehicles
-                if v.distance <= start and drivers[v.lane, v.rank].human
-            }
-            taken = tuple(_taken(seen, ways, drivers, start, movements))
-            latest[:] = [seen, View(seen.time, taken)]
-        return latest[1]
-
-    return take
-
-
-def _taken(
-    view: View, ways: Mapping[int, list[int]], drivers: Drivers, start: float, movements: Movements
-) -> Iterable[Observed]:
-    """The vehicles of a view as DIM interprets them.
-
-    A human at the front of a lane, from the yellow zone on, is treated as a vehicle that can no
-    longer stop before the junction. `ways` are the movements that each human there may take.
-    """
-    lane = -1
-    for vehicle in view.vehicles:
-        first = vehicle.distance >= 0.0 and vehicle.lane != lane
-        if first:
-            lane = vehicle.lane
-        if vehicle.distance <= start and drivers[vehicle.lane, vehicle.rank].human:
-            possible = ways.get(vehicle.id, ())
-            manoeuvre = movements[possible[0]].manoeuvre if len(possible) == 1 else UNKNOWN
-            vehicle = vehicle._replace(manoeuvre=manoeuvre)
-            if first:
-                vehicle = vehicle._replace(distance=0.0, speed=1.0)
-        yield vehicle
-
-
 class _Humans:
-    """The human drivers of a run; they see the last `sight` [m] before the junction."""
+    """The human drivers of a run."""
 
-    def __init__(self, mixed: Mixed, site: Site, readings: Readings) -> None:
-        humans, zones = mixed.humans, mixed.dim.zones
-        self._humans, self._drivers, self._readings = humans, readings.drivers, readings
+    def __init__(self, mixed: Mixed, site: Site, readings: Readings, queue: Queue) -> None:
+        self._humans, self._readings, self._queue = mixed.humans, readings, queue
         self._clearing = [
             clearing_distances(site.intersection, it, site.fleet).tolist() for it in site.types
         ]
-        self._line = zones.green + LINE
-        self._yellow = zones.yellow_start + ROUNDING
+        self._yellow = mixed.dim.zones.yellow_start + ROUNDING
         self._dt = site.dt
-        longest = max(humans.critical_gaps) * (1.0 + 3.0 * humans.deviation)
-        self.sight = longest * site.speed_limit
         self._standing: dict[int, float] = {}  # vehicle: since when [s]
         self._gone: set[int] = set()
         self._went: dict[int, float] = {}  # lane: when its last driver went [s]
 
     def decide(self, view: View) -> Iterable[Command]:
         """Let drivers start; ask to be called again while one is at the junction."""
-        now, drivers = view.time, self._drivers
+        now, heads = view.time, self._queue.heads
         self._gone.intersection_update([v.id for v in view.vehicles])
-        crossing = [v for v in view.vehicles if v.distance < 0.0 or v.id in self._gone]
-        heads: dict[int, Observed] = {}
-        for vehicle in view.vehicles:  # front to back
-            if vehicle.distance >= 0.0 and vehicle.id not in self._gone:
-                heads.setdefault(vehicle.lane, vehicle)
-        people = [v for v in heads.values() if drivers[v.lane, v.rank].human]
-        here = [v for v in people if v.distance <= self._yellow]
-        rolling = [v for v in heads.values() if v.speed > HALTING and v not in people]
+        there = [v for v in view.vehicles if v.distance < 0.0 or v.id in self._gone]
         before = self._standing
         self._standing = {
-            v.id: before.get(v.id, now)
-            for v in here
-            if v.speed <= HALTING and v.distance <= self._line
+            i: before.get(i, now) for i in self._queue.people if heads[i].speed <= HALTING
         }
-        queue = [v for v in here if v.id in self._standing]
-        queue.sort(key=lambda v: (self._standing[v.id], v.lane))
         commands: list[Command] = []
-        waiting: list[Observed] = []
-        for vehicle in queue:
-            free = self._is_free(vehicle, (*waiting, *crossing), rolling)
-            if free and self._is_ready(vehicle, now):
+        for vehicle in heads.values():
+            if vehicle.id in self._gone:
+                continue
+            if (
+                vehicle.id in self._standing
+                and self._is_ready(vehicle, now)
+                and self._is_free(vehicle, there)
+            ):
                 commands.append(Go(vehicle.id))
                 self._gone.add(vehicle.id)
                 self._went[vehicle.lane] = now
-                crossing.append(vehicle)
-            else:
-                waiting.append(vehicle)
-        return [*commands, Wake(now + max(LOOK, self._dt))] if here else commands
+            there.append(vehicle)
+        return [*commands, Wake(now + max(LOOK, self._dt))] if self._looks(view) else commands
+
+    def _looks(self, view: View) -> bool:
+        """Whether a driver that is the first of its lane in the yellow zone looks around."""
+        lane = -1
+        for vehicle in view.vehicles:  # front to back
+            if vehicle.distance >= 0.0 and vehicle.id not in self._gone and vehicle.lane != lane:
+                lane = vehicle.lane
+                if vehicle.distance <= self._yellow and self._queue.is_human(vehicle):
+                    return True
+        return False
 
     def _is_ready(self, vehicle: Observed, now: float) -> bool:
         """Whether the reaction and follow-up times are over, to within half a step."""
@@ -195,18 +154,12 @@ class _Humans:
         followed = self._went.get(vehicle.lane, -math.inf) + humans.follow_up[turn]
         return now + self._dt / 2.0 >= max(looked, followed)
 
-    def _is_free(
-        self, vehicle: Observed, there: Iterable[Observed], rolling: Iterable[Observed]
-    ) -> bool:
-        """Whether no vehicle is in the way of a driver at the line, or comes too soon."""
+    def _is_free(self, vehicle: Observed, there: Iterable[Observed]) -> bool:
+        """Whether no vehicle that came before or goes already is in the way of a driver."""
         own = self._readings.index(vehicle)
-        mean_gap = self._humans.critical_gaps[self._readings.turns[own]]
-        gap = self._drivers[vehicle.lane, vehicle.rank].gap * mean_gap
-        comes = [v for v in rolling if v.distance <= max(self._yellow, gap * v.speed)]
-        trust = self._humans.trust
         # The distances are minus infinity where ways do not conflict.
         return not any(
             self._clearing[other.type][own][way] + min(other.distance, 0.0) > 0.0
-            for other in (*there, *comes)
-            for way in self._readings.possible(other, trust)
+            for other in there
+            for way in self._readings.possible(other, self._humans.trust)
         )
