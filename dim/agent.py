@@ -34,9 +34,7 @@ class Agent:
         self.rules = rules
         self.right_of_way = False
 
-    def decide(
-        self, percept: Percept, table: DecisionTable | None = None, gate: str | None = None
-    ) -> bool:
+    def decide(self, percept: Percept, table: DecisionTable | None = None) -> bool:
         """Whether the vehicle goes, given what it perceives now (lines 4–12 of Algorithm 1).
 
         - A crossing vehicle keeps going. Under the paper's commit rule it also goes if it has lost
@@ -48,8 +46,7 @@ class Agent:
           intent, it must belong to the clique of every possible case. So all the vehicles that go
           belong to the clique of the true case, however little each of them knows.
 
-        If lane priorities change, `table` is for the present ones, and so is `gate` if that
-        changes; by default they are the rules'.
+        If lane priorities change, `table` is for the present ones; by default it is the rules'.
         """
         rules = self.rules
         table = rules.table if table is None else table
@@ -57,7 +54,7 @@ class Agent:
             if self.vehicle in percept.crossing:
                 self.right_of_way |= rules.commit == "paper"
                 return self.right_of_way
-            if (gate or rules.gate) == "clear":
+            if rules.gate == "clear":
                 return self.right_of_way
         if self.vehicle in percept.participants:
             lanes = table.surely(percept.case, percept.unknown, percept.occupied)

@@ -1,22 +1,24 @@
-"""Mixed autonomy: vehicles that follow DIM among human drivers.
+"""Mixed autonomy: vehicles that follow DIM among human drivers, who take turns.
 
-DIM yields. A human in the yellow zone may start at any time, so it counts as crossing: a DIM
-vehicle enters only if it is in harmony with everything the human may do. A human stops at the hold
-line as at an all-way stop and looks at positions, speeds and indicators; it sees no right of way.
-After its reaction time it goes if
+The junction is an all-way stop: of two in each other's way, the first to come is the first to go
+(`dim.humans.queue`). Each knows what was there when it came, so this takes no message. Drivers must
+recognise vehicles of DIM, which come without stopping, say by marker lamps (SAE J3134).
 
-- every human that stopped before it and is in its way has gone,
-- every vehicle inside is out of its way,
-- no DIM vehicle is rolling through its yellow zone, and none arrives within the critical gap.
+A human stops at the hold line and looks at positions, speeds and indicators; it sees no right of
+way. After its reaction time it goes as soon as all vehicles that came before it or go already are
+out of its way.
 
-No vehicles collide, unless some trust silence (`dim.humans.drivers.TRUSTS`). When a human starts,
-the DIM vehicles in conflict with it stand or are outside the yellow zone, and get no right of way
-until it has left. A standing DIM vehicle has none: with the junction empty, it would have moved off
-one step after being granted it, before a driver can look.
+A vehicle of DIM that came after a human waits until all that came before it and are in its way,
+wherever humans may go, have entered the junction. The others take part in DIM's decisions. While a
+human is in the queue or inside the junction, the gate is "harmonious": humans enter while others
+cross, too, and those that wait for an empty junction could wait for ever.
 
-No vehicles wait in a circle: DIM waits for humans, and no human waits for a DIM vehicle that
-stands. So drivers must recognise DIM vehicles, say by marker lamps for automated driving (SAE
-J3134). Otherwise each would let the other go first.
+No vehicles collide, unless some trust silence (`dim.humans.drivers.TRUSTS`): of a human and another
+in its way, the one that came later waits until the first has entered, and then until it is out of
+the way. What has not come yet comes later: a human must stand at the line first, and a vehicle of
+DIM must be the first of its lane in the yellow zone.
+
+No vehicles wait in a circle, and no vehicle overtakes a human in whose way it is: `docs/safety.md`.
 """
 
 from __future__ import annotations
@@ -28,7 +30,6 @@ from dataclasses import replace
 from dim.controller import Dim, DimSession
 from dim.humans.drivers import TRUSTS, Drivers, Humans, Readings
 from dim.humans.queue import Courtesy, Queue
-from dim.perception import ROUNDING
 from minisim.control import HALTING, Command, Go, Observed, Plan, Session, Site, View, Wake
 from minisim.junction.conflicts import clearing_distances
 from minisim.parameters import declared, part, real, word
@@ -65,17 +66,18 @@ class MixedSession:
     """One run: a session of DIM for some vehicles, and the humans."""
 
     def __init__(self, mixed: Mixed, site: Site) -> None:
-        drivers = self._drivers = Drivers(mixed.humans, mixed.share, site.seed)
+        drivers = self._drivers = Drivers(mixed.share, site.seed)
         readings = Readings(mixed.humans, site, drivers)
-        self._queue, self._gate = Queue(mixed.dim.zones, drivers), mixed.dim.gate
+        queue = self._queue = Queue(mixed.dim.zones, drivers)
         self._dim = DimSession(
-            mixed.dim, site, lambda v: not self._queue.is_human(v), lambda *it: courtesy(*it)
+            mixed.dim, site, lambda v: not queue.is_human(v), lambda *views: courtesy(*views)
         )
-        courtesy = Courtesy(__import__("os").environ.get("TRUST", mixed.trust), readings, self._dim.rules.table.matrix, self._queue)
-        self._humans = _Humans(mixed, site, readings, self._queue)
-        plan = self._dim.plan
-        marks = dict.fromkeys((*plan.marks, 0.0))  # at the entry another becomes first
-        self.plan: Plan = replace(plan, marks=tuple(marks))
+        rules = self._dim.rules
+        courtesy = Courtesy(mixed.trust, readings, rules.table.matrix, queue)
+        self._rules = rules, replace(rules, gate="harmonious")
+        self._people = _People(mixed.humans, site, readings, queue)
+        marks = dict.fromkeys((*self._dim.plan.marks, 0.0))  # at the entry another becomes first
+        self.plan: Plan = replace(self._dim.plan, marks=tuple(marks))
 
     def kind(self, lane: int, rank: int) -> str:
         """ "human" or "automated"."""
@@ -89,25 +91,21 @@ class MixedSession:
     def decide(self, view: View) -> Iterable[Command]:
         """Let all vehicles decide, from the same view."""
         self._queue.look(view)
-        self._dim.gate = "harmonious" if self._queue.people or any(v.distance < 0.0 and self._queue.is_human(v) for v in view.vehicles) else self._gate
-        commands = [*self._dim.decide(view), *self._humans.decide(view)]
+        self._dim.rules = self._rules[self._queue.humans]
+        commands = [*self._dim.decide(view), *self._people.decide(view)]
         wakes = [command.time for command in commands if isinstance(command, Wake)]
         others = [command for command in commands if not isinstance(command, Wake)]
-        import os
-        if os.environ.get("LOOKS") and any(v.distance < 0.0 and self._queue.is_human(v) for v in view.vehicles):
-            wakes.append(view.time + LOOK)
         return [*others, Wake(min(wakes))] if wakes else others
 
 
-class _Humans:
+class _People:
     """The human drivers of a run."""
 
-    def __init__(self, mixed: Mixed, site: Site, readings: Readings, queue: Queue) -> None:
-        self._humans, self._readings, self._queue = mixed.humans, readings, queue
+    def __init__(self, humans: Humans, site: Site, readings: Readings, queue: Queue) -> None:
+        self._humans, self._readings, self._queue = humans, readings, queue
         self._clearing = [
             clearing_distances(site.intersection, it, site.fleet).tolist() for it in site.types
         ]
-        self._yellow = mixed.dim.zones.yellow_start + ROUNDING
         self._dt = site.dt
         self._standing: dict[int, float] = {}  # vehicle: since when [s]
         self._gone: set[int] = set()
@@ -115,37 +113,22 @@ class _Humans:
 
     def decide(self, view: View) -> Iterable[Command]:
         """Let drivers start; ask to be called again while one is at the junction."""
-        now, heads = view.time, self._queue.heads
+        now, queue, before = view.time, self._queue, self._standing
         self._gone.intersection_update([v.id for v in view.vehicles])
         there = [v for v in view.vehicles if v.distance < 0.0 or v.id in self._gone]
-        before = self._standing
-        self._standing = {
-            i: before.get(i, now) for i in self._queue.people if heads[i].speed <= HALTING
-        }
+        looking = any(v.id not in self._gone for v in queue.near)
+        heads = [v for v in queue.heads.values() if v.id not in self._gone]
+        standing = [v.id for v in heads if v.id in queue.people and v.speed <= HALTING]
+        self._standing = {i: before.get(i, now) for i in standing}
         commands: list[Command] = []
-        for vehicle in heads.values():
-            if vehicle.id in self._gone:
-                continue
-            if (
-                vehicle.id in self._standing
-                and self._is_ready(vehicle, now)
-                and self._is_free(vehicle, there)
-            ):
+        for vehicle in heads:
+            ready = vehicle.id in self._standing and self._is_ready(vehicle, now)
+            if ready and self._is_free(vehicle, there):
                 commands.append(Go(vehicle.id))
                 self._gone.add(vehicle.id)
                 self._went[vehicle.lane] = now
             there.append(vehicle)
-        return [*commands, Wake(now + max(LOOK, self._dt))] if self._looks(view) else commands
-
-    def _looks(self, view: View) -> bool:
-        """Whether a driver that is the first of its lane in the yellow zone looks around."""
-        lane = -1
-        for vehicle in view.vehicles:  # front to back
-            if vehicle.distance >= 0.0 and vehicle.id not in self._gone and vehicle.lane != lane:
-                lane = vehicle.lane
-                if vehicle.distance <= self._yellow and self._queue.is_human(vehicle):
-                    return True
-        return False
+        return [*commands, Wake(now + max(LOOK, self._dt))] if looking else commands
 
     def _is_ready(self, vehicle: Observed, now: float) -> bool:
         """Whether the reaction and follow-up times are over, to within half a step."""
@@ -155,7 +138,7 @@ class _Humans:
         return now + self._dt / 2.0 >= max(looked, followed)
 
     def _is_free(self, vehicle: Observed, there: Iterable[Observed]) -> bool:
-        """Whether no vehicle that came before or goes already is in the way of a driver."""
+        """Whether all vehicles that came earlier or cross are out of a driver's way."""
         own = self._readings.index(vehicle)
         # The distances are minus infinity where ways do not conflict.
         return not any(

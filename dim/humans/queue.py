@@ -1,4 +1,4 @@
-"""Turns at a junction where humans drive: what came first, and what DIM makes of it."""
+"""The queue of a junction where humans drive, and which vehicles of DIM it keeps waiting."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ LINE = 1.0  #: a driver stands at the line when its front is at most this far be
 
 
 class Queue:
-    """The first vehicles of the lanes that have come to the junction, in that order.
+    """The first vehicle of each lane, in the order in which they came.
 
-    A vehicle of DIM comes when it enters the yellow zone, or later becomes the first of its lane
-    there. A human comes when it stands at the line. Of several at once, the vehicles of DIM come
-    first, then the lanes in order. It leaves the queue when its front enters the junction.
+    A vehicle of DIM has come once it is the first of its lane in the yellow zone, a human once it
+    also stands at the line. Of those that come at once, DIM's are before humans, then lane a is
+    before lane b. A vehicle leaves the queue when its front enters the junction.
     """
 
     def __init__(self, zones: Zones, drivers: Drivers) -> None:
@@ -27,95 +27,96 @@ class Queue:
         self._drivers = drivers
         self.heads: dict[int, Observed] = {}  #: by id, in order
         self.people: set[int] = set()  #: ids of the humans among them
+        self.near: list[
+            Observed
+        ] = []  #: humans that are the first of their lane in the yellow zone
+        self.humans = False  #: whether a human is in the queue or inside the junction
 
     def look(self, view: View) -> None:
-        """Note what has come and gone."""
+        """Note which vehicles have come and which have gone."""
         firsts: dict[int, Observed] = {}
         for vehicle in view.vehicles:  # front to back
             if vehicle.distance >= 0.0:
                 firsts.setdefault(vehicle.lane, vehicle)
-        here = {v.id: v for v in firsts.values()}
-        there = {i: here[i] for i in self.heads if i in here}
-        come = [v for v in here.values() if v.id not in there and self._has_come(v)]
+        near = [v for v in firsts.values() if v.distance <= self._yellow]
+        self.near = [v for v in near if self.is_human(v)]
+        here = {v.id: v for v in near}
+        stay = {i: here.pop(i) for i in self.heads if i in here}
+        come = [v for v in here.values() if v not in self.near or self._stands(v)]
         come.sort(key=lambda v: (self.is_human(v), v.lane))
-        self.heads = there | {v.id: v for v in come}
+        self.heads = stay | {v.id: v for v in come}
         self.people = {i for i, v in self.heads.items() if self.is_human(v)}
+        inside = (self.is_human(v) for v in view.vehicles if v.distance < 0.0)
+        self.humans = bool(self.people) or any(inside)
 
     def is_human(self, vehicle: Observed) -> bool:
-        """Whether a human drives it, which its lamps would tell."""
+        """Whether a human drives a vehicle, as lamps would tell."""
         return self._drivers[vehicle.lane, vehicle.rank].human
 
-    def _has_come(self, vehicle: Observed) -> bool:
-        if self.is_human(vehicle):
-            return vehicle.speed <= HALTING and vehicle.distance <= self._line
-        return vehicle.distance <= self._yellow
+    def _stands(self, vehicle: Observed) -> bool:
+        return vehicle.speed <= HALTING and vehicle.distance <= self._line
 
 
 class Courtesy:
-    """How vehicles of DIM interpret what they see, so that humans get their turn.
+    """How vehicles of DIM interpret a view, so that each vehicle in the queue gets its turn.
 
-    A vehicle that came after a human waits for all that came before it and are in its way. It
-    takes no part until then, and neither do humans before the junction, which wait for DIM.
+    One that came after a human takes no part until all that came before it, and are in its way,
+    have entered the junction. Humans before the junction take no part either: they go after all
+    vehicles that came before them, and those that come after them wait.
     """
 
-    def __init__(
-        self, trust: str, readings: Readings, matrix: HarmonyMatrix, queue: Queue
-    ) -> None:
+    def __init__(self, trust: str, readings: Readings, matrix: HarmonyMatrix, queue: Queue) -> None:
         self._trust, self._readings, self._queue = trust, readings, queue
-        self._matrix = matrix
-        self._conflict = (~matrix.values).tolist()
+        self._conflict, self._movements = (~matrix.values).tolist(), matrix.movements
+        self._turns = len(readings.turns) if matrix.types > 1 else 0  # rows of the matrix by type
         self._latest: tuple[View, View] | None = None  # what was seen last, and its interpretation
 
     def __call__(self, view: View, seen: View) -> View:
-        """What a vehicle takes for the traffic, given the true `view` and what it has `seen`."""
+        """What a vehicle makes of what it has `seen` of the true `view`."""
         if self._latest is None or self._latest[0] is not seen:
-            true = {v.id: v for v in view.vehicles if self._queue.is_human(v)}
-            self._latest = seen, View(seen.time, tuple(self._taken(seen, true)))
+            ways = {
+                v.id: self._readings.possible(v, self._trust)
+                for v in view.vehicles
+                if self._queue.is_human(v)
+            }
+            self._latest = seen, View(seen.time, tuple(self._taken(seen, ways)))
         return self._latest[1]
 
-    def _taken(self, seen: View, true: Mapping[int, Observed]) -> Iterator[Observed]:
-        shown = {v.id: v for v in seen.vehicles}
-        ways = {
-            i: self._ways(shown[i], true.get(i)) for i in (*self._queue.heads, *true) if i in shown
-        }
-        waiting = self._waiting(ways)
-        closed = -1  # the lane whose vehicles before the junction do not take part
+    def _taken(self, seen: View, ways: Mapping[int, list[int]]) -> Iterator[Observed]:
+        """The vehicles that take part; `ways` are the movements that each human may take."""
+        waiting = self._waiting(seen, ways)
+        closed = -1  # the lane of which no more vehicles take part
         for vehicle in seen.vehicles:
-            human = vehicle.id in true
-            if vehicle.distance >= 0.0:
-                if human or vehicle.id in waiting:
-                    closed = vehicle.lane
-                if vehicle.lane == closed:
-                    continue
-            elif human:
-                own = ways[vehicle.id]
-                known = vehicle.manoeuvre if len(own) == 1 else UNKNOWN
+            human = self._queue.is_human(vehicle)
+            if vehicle.distance >= 0.0 and (human or vehicle.id in waiting):
+                closed = vehicle.lane
+            if vehicle.distance >= 0.0 and vehicle.lane == closed:
+                continue
+            if human:
+                own = ways.get(vehicle.id, ())
+                known = self._movements[own[0]].manoeuvre if len(own) == 1 else UNKNOWN
                 vehicle = vehicle._replace(manoeuvre=known)
             yield vehicle
 
-    def _waiting(self, ways: Mapping[int, list[int]]) -> set[int]:
-        """The vehicles of DIM that came after a human and have another before them in their way."""
+    def _waiting(self, seen: View, ways: Mapping[int, list[int]]) -> set[int]:
+        """Vehicles of DIM that came after a human, and after another that is in their way."""
         waiting: set[int] = set()
-        before: list[int] = []
-        behind = False  # whether a human came before
-        for vehicle in self._queue.heads:
-            if vehicle not in ways:
+        shown = {v.id: v for v in seen.vehicles}
+        taken: list[int] = []  # rows of the matrix that vehicles before may take
+        human = False  # whether there is one before
+        for i in self._queue.heads:
+            if i not in shown:
                 continue
-            if vehicle in self._queue.people:
-                behind = True
-            elif behind and any(
-                self._conflict[k][q] for k in ways[vehicle] for one in (before[:1+max(n for n, i in enumerate(before) if i in self._queue.people)] if __import__("os").environ.get("BAR") else before) for q in ways[one]
-            ):
-                waiting.add(vehicle)
-            before.append(vehicle)
+            rows = self._rows(shown[i], ways.get(i))
+            human |= i in ways
+            if human and any(self._conflict[row][other] for row in rows for other in taken):
+                waiting.add(i)
+            taken += rows
         return waiting
 
-    def _ways(self, vehicle: Observed, human: Observed | None) -> list[int]:
-        """The rows of the matrix that a vehicle may mean."""
-        row = self._readings.rows[vehicle.lane]
-        if human is not None:
-            own = self._readings.possible(human, self._trust)
-        else:
-            own = [row[vehicle.manoeuvre]] if vehicle.manoeuvre != UNKNOWN else list(row[1:])
-        kind = vehicle.type if self._matrix.types > 1 else 0
-        return [kind * len(self._readings.turns) + k for k in own]
+    def _rows(self, vehicle: Observed, ways: list[int] | None) -> list[int]:
+        """The rows of the matrix for all that a vehicle may do."""
+        if ways is None:
+            row = self._readings.rows[vehicle.lane]
+            ways = [row[vehicle.manoeuvre]] if vehicle.manoeuvre != UNKNOWN else list(row[1:])
+        return [vehicle.type * self._turns + way for way in ways]

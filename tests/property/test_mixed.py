@@ -41,8 +41,7 @@ def traffic(draw: st.DrawFn) -> tuple[Scenario, Mixed]:
         recorded=demand.draw(intersection.n, DEMANDED, seed=draw(st.integers(0, 1000))),
     )  # fmt: skip
     humans = Humans(
-        critical_gaps=draw(st.sampled_from([(6.2, 6.5, 7.1), (0.0, 0.0, 0.0)])),
-        deviation=draw(st.sampled_from([0.0, 0.3])),
+        follow_up=draw(st.sampled_from([(3.3, 4.0, 3.5), (0.0, 0.0, 0.0)])),
         reaction=draw(st.sampled_from([0.5, 1.9])),
         trust=draw(st.sampled_from(SAFE)),
     )
@@ -67,7 +66,7 @@ def test_safe_and_alive(given_traffic: tuple[Scenario, Mixed]) -> None:
 def seed_of(lanes: tuple[int, ...], kinds: tuple[bool, ...], quiet: bool) -> int:
     """A seed whose first vehicles on these lanes are human or not, and quiet or not, as asked."""
     for seed in itertools.count():
-        drivers = Drivers(Humans(), 0.5, seed)
+        drivers = Drivers(0.5, seed)
         found = [drivers[lane, 0] for lane in lanes]
         fitting = all(not d.human or (d.careless < 0.25) == quiet for d in found)
         if fitting and tuple(d.human for d in found) == kinds:
@@ -107,7 +106,7 @@ def test_no_vehicles_wait_in_a_circle(gate: str) -> None:
 @share(0.2)
 @given(seed=st.integers(0, 1000))
 def test_drivers_depend_only_on_seed_and_share(seed: int) -> None:
-    fewer, more, alike = (Drivers(Humans(), share, seed) for share in (0.2, 0.7, 0.2))
+    fewer, more, alike = (Drivers(share, seed) for share in (0.2, 0.7, 0.2))
     vehicles = [(lane, rank) for rank in range(100) for lane in range(5)]
     for which in vehicles:
         assert more[which].human or not fewer[which].human

@@ -23,7 +23,7 @@ from tests.builders import digest, replayed, seen, view
 SITE = four_way(profile="fair").site()
 #: Drivers of this share and seed, with ids (and ranks) that are of one kind on every lane.
 MIXED = Mixed(share=0.5)
-DRIVERS = Drivers(Humans(), MIXED.share, SITE.seed)
+DRIVERS = Drivers(MIXED.share, SITE.seed)
 HUMAN = np.array([[DRIVERS[lane, i].human for lane in range(4)] for i in range(400)])
 PEOPLE = np.flatnonzero(HUMAN.all(axis=1)).tolist()
 #: A driver that announces every turn, on every lane.
@@ -238,7 +238,7 @@ def test_drivers_that_believe_in_silence_collide() -> None:
 def test_the_groups_of_a_run_make_up_the_whole() -> None:
     run = minisim.simulate(four_way(150, profile="fair", horizon=600.0), Mixed(share=0.4), 2)
     groups = run.summary()["kinds"]
-    drivers, met = Drivers(Humans(), 0.4, run.seed), run.scenario.arrivals(run.seed)
+    drivers, met = Drivers(0.4, run.seed), run.scenario.arrivals(run.seed)
     human = np.array([drivers[k].human for k in zip(met.lane, met.rank, strict=True)])
     assert groups["human"]["trips"] == int(human.sum()) > 10
     waits = run.columns.waiting_time[human & run.columns.departed]
