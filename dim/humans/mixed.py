@@ -49,7 +49,7 @@ class Mixed:
     humans: Humans = part("how they drive", Humans, default=Humans())
     trust: str = word(
         "what vehicles of DIM believe about a human's way, as in `Humans.trust`",
-        TRUSTS, default="motion",
+        TRUSTS, default="signals",
     )  # fmt: skip
 
     @property
