@@ -27,9 +27,8 @@ class Queue:
         self._drivers = drivers
         self.heads: dict[int, Observed] = {}  #: by id, in order
         self.people: set[int] = set()  #: ids of the humans among them
-        self.near: list[
-            Observed
-        ] = []  #: humans that are the first of their lane in the yellow zone
+        #: Humans that are the first of their lane in the yellow zone.
+        self.near: list[Observed] = []
         self.humans = False  #: whether a human is in the queue or inside the junction
 
     def look(self, view: View) -> None:
