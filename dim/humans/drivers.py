@@ -6,10 +6,11 @@ A junction of equal roads is an all-way stop (Highway Capacity Manual, HCM, 7th 
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 from minisim.control import Observed, Site
-from minisim.junction.conflicts import CLEARANCE
+from minisim.junction.conflicts import CLEARANCE, clearing_distances
 from minisim.junction.partings import parting
 from minisim.junction.turns import Turn, turns
 from minisim.parameters import Reals, declared, real, reals, word
@@ -81,6 +82,9 @@ class Readings:
         self._silent = (humans.unsignalled[0], 1.0, humans.unsignalled[1])
         self.drivers = drivers
         self.rows = site.intersection.movements.rows
+        self._clearing = [
+            clearing_distances(site.intersection, it, site.fleet).tolist() for it in site.types
+        ]
         # Beyond the parting of two ways, a vehicle's place shows which of them it takes.
         self._parting = parting(site.intersection, CLEARANCE).tolist()
 
@@ -105,3 +109,15 @@ class Readings:
             turn = shown
         meant = [q for q in alike if self.turns[q] is turn]
         return meant or alike  # motion contradicts silence, or the lane has no way straight on
+
+    def blocks(self, other: Observed, own: Iterable[int], trust: str) -> bool:
+        """Whether another may be, or come, in the way of a vehicle on one of its `own` movements.
+
+        A vehicle inside the junction no longer is once its rear has left their corridors.
+        """
+        # The distances are minus infinity where ways do not conflict.
+        return any(
+            self._clearing[other.type][mine][way] + min(other.distance, 0.0) > 0.0
+            for way in self.possible(other, trust)
+            for mine in own
+        )

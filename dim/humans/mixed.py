@@ -31,7 +31,6 @@ from dim.controller import Dim, DimSession
 from dim.humans.drivers import TRUSTS, Drivers, Humans, Readings
 from dim.humans.queue import Courtesy, Queue
 from minisim.control import HALTING, Command, Go, Observed, Plan, Session, Site, View, Wake
-from minisim.junction.conflicts import clearing_distances
 from minisim.parameters import declared, part, real, word
 
 LOOK = 0.2  #: how often a driver at the junction looks at the others [s]
@@ -103,9 +102,6 @@ class _People:
 
     def __init__(self, humans: Humans, site: Site, readings: Readings, queue: Queue) -> None:
         self._humans, self._readings, self._queue = humans, readings, queue
-        self._clearing = [
-            clearing_distances(site.intersection, it, site.fleet).tolist() for it in site.types
-        ]
         self._dt = site.dt
         self._standing: dict[int, float] = {}  # vehicle: since when [s]
         self._gone: set[int] = set()
@@ -139,10 +135,5 @@ class _People:
 
     def _is_free(self, vehicle: Observed, there: Iterable[Observed]) -> bool:
         """Whether all vehicles that came earlier or cross are out of a driver's way."""
-        own = self._readings.index(vehicle)
-        # The distances are minus infinity where ways do not conflict.
-        return not any(
-            self._clearing[other.type][own][way] + min(other.distance, 0.0) > 0.0
-            for other in there
-            for way in self._readings.possible(other, self._humans.trust)
-        )
+        own = (self._readings.index(vehicle),)
+        return not any(self._readings.blocks(it, own, self._humans.trust) for it in there)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from dim.harmony import HarmonyMatrix
 from dim.humans.drivers import Drivers, Readings
@@ -62,6 +62,10 @@ class Courtesy:
     One that came after a human takes no part until all that came before it, and are in its way,
     have entered the junction. Humans before the junction take no part either: they go after all
     vehicles that came before them, and those that come after them wait.
+
+    As humans do, vehicles of DIM go as soon as others inside are out of the way. So with a human at
+    the junction, one inside does not count once it is in no other's way; where perception errs, it
+    counts until it has left.
     """
 
     def __init__(self, trust: str, readings: Readings, matrix: HarmonyMatrix, queue: Queue) -> None:
@@ -78,24 +82,37 @@ class Courtesy:
                 for v in view.vehicles
                 if self._queue.is_human(v)
             }
-            self._latest = seen, View(seen.time, tuple(self._taken(seen, ways)))
+            there = list(self._there(seen, ways))
+            if seen is view and self._queue.humans:
+                there = [v for v in there if v.distance >= 0.0 or self._blocks_any(v, there)]
+            taken = tuple(self._known(v, ways.get(v.id, ())) for v in there)
+            self._latest = seen, View(seen.time, taken)
         return self._latest[1]
 
-    def _taken(self, seen: View, ways: Mapping[int, list[int]]) -> Iterator[Observed]:
-        """The vehicles that take part; `ways` are the movements that each human may take."""
+    def _there(self, seen: View, ways: Mapping[int, list[int]]) -> Iterator[Observed]:
+        """The vehicles that take part or are inside; `ways` are those that each human may take."""
         waiting = self._waiting(seen, ways)
         closed = -1  # the lane of which no more vehicles take part
         for vehicle in seen.vehicles:
-            human = self._queue.is_human(vehicle)
-            if vehicle.distance >= 0.0 and (human or vehicle.id in waiting):
-                closed = vehicle.lane
-            if vehicle.distance >= 0.0 and vehicle.lane == closed:
-                continue
-            if human:
-                own = ways.get(vehicle.id, ())
-                known = self._movements[own[0]].manoeuvre if len(own) == 1 else UNKNOWN
-                vehicle = vehicle._replace(manoeuvre=known)
+            if vehicle.distance >= 0.0:
+                if self._queue.is_human(vehicle) or vehicle.id in waiting:
+                    closed = vehicle.lane
+                if vehicle.lane == closed:
+                    continue
             yield vehicle
+
+    def _blocks_any(self, vehicle: Observed, there: Iterable[Observed]) -> bool:
+        """Whether a vehicle inside may still be in the way of one from another lane."""
+        possible, trust = self._readings.possible, self._trust
+        others = (v for v in there if v.lane != vehicle.lane)
+        return any(self._readings.blocks(vehicle, possible(v, trust), trust) for v in others)
+
+    def _known(self, vehicle: Observed, ways: Sequence[int]) -> Observed:
+        """A vehicle as DIM takes it: the manoeuvre of a human is known only if no other is left."""
+        if not self._queue.is_human(vehicle):
+            return vehicle
+        known = self._movements[ways[0]].manoeuvre if len(ways) == 1 else UNKNOWN
+        return vehicle._replace(manoeuvre=known)
 
     def _waiting(self, seen: View, ways: Mapping[int, list[int]]) -> set[int]:
         """Vehicles of DIM that came after a human, and after another that is in their way."""
