@@ -200,7 +200,7 @@ class DimSession:
         if typed:
             rules = HarmonyMatrix.from_geometry(site.intersection, site.fleet, by_type=True)
         table = decision_table(rules, dim.order, dim.ranks(site))
-        self.rules = Rules(table, dim.gate, dim.commit)
+        self.rules = Rules(table, dim.gate, dim.commit)  #: those in force at the next look
         brakes = tuple(it.deceleration for it in site.types)
         self.reader = Reader(site.intersection.n, zones, brakes, dim.commit, rules.types)
         half_green = (zones.green / 2.0,) if dim.commit == "paper" else ()
@@ -224,7 +224,7 @@ class DimSession:
         self._dt, self._follows, self._takes = site.dt, follows, takes
         self._agents: dict[int, Agent] = {}
         exact = looks is None
-        self._tally = None if exact else Tally(self.rules, self.reader, self._start)
+        self._tally = None if exact else Tally(self.reader, self._start)
 
     @property
     def counts(self) -> Mapping[str, float]:
@@ -244,7 +244,7 @@ class DimSession:
             if ego.distance > self._start or not self._follows(ego):
                 continue
             agent = self._agents.get(vehicle) or Agent(vehicle, ego.lane, self.rules)
-            agents[vehicle] = agent
+            agents[vehicle], agent.rules = agent, self.rules
             sight = sights[vehicle] = self.see(view, ego)
             if sight is not seen or percept is None:  # vehicles that see the same read the same
                 seen, percept = sight, self.reader.read(sight)
@@ -265,7 +265,7 @@ class DimSession:
             look_again |= self._monitors.needed
         if self._tally is not None:
             true = view if self._takes is None else self._takes(view, view)
-            self._tally.count(true, sights, table, going)
+            self._tally.count(view, true, sights, self.rules, table, going)
         if look_again:
             commands.append(Wake(view.time + self._dt))
         elif waiting and until < math.inf:

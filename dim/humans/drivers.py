@@ -1,19 +1,16 @@
-"""Human drivers: which vehicles have one, what they signal, and which gaps they accept.
+"""Human drivers: which vehicles have one, what they signal, and how fast they react.
 
-The numbers are from the Highway Capacity Manual (HCM, 7th edition), chapter 20, two-way stop
-control, base values for a two-lane major street: for drivers at a stop sign on the minor street,
-in streams of rank 2 (right turns), 3 (straight on) and 4 (left turns) in right-hand traffic. At a
-junction of equal roads, an all-way stop (HCM chapter 21), all drivers stop and none accepts gaps.
-Drivers here do both: the first of them to stop goes first, and they accept gaps in other traffic.
+A junction of equal roads is an all-way stop (Highway Capacity Manual, HCM, 7th edition, chapter
+21): all drivers stop, the first to stop is the first to go, and none has to accept a gap.
 """
 
 from __future__ import annotations
 
-import math
+from collections.abc import Iterable
 from typing import NamedTuple
 
 from minisim.control import Observed, Site
-from minisim.junction.conflicts import CLEARANCE
+from minisim.junction.conflicts import CLEARANCE, clearing_distances
 from minisim.junction.partings import parting
 from minisim.junction.turns import Turn, turns
 from minisim.parameters import Reals, declared, real, reals, word
@@ -24,27 +21,17 @@ from minisim.streams import Draws
 #: on, which is false for turns that no indicator announces.
 TRUSTS = ("motion", "signals", "silence")
 
-_HUMAN, _CARELESS, _GAP = range(3)  # what a draw is for
+_HUMAN, _CARELESS = range(2)  # what a draw is for
 
 
 @declared(kw_only=True)
 class Humans:
     """How people drive. Triples are for the near turn, straight on, and the far turn."""
 
-    # Critical gaps: HCM exhibit 20-17; follow-up times: exhibit 20-18.
-    critical_gaps: Reals[tuple[float, float, float]] = reals(
-        "a driver goes first if a vehicle that need not stop arrives no sooner than this", "s",
-        count=3, low=0, high=60, default=(6.2, 6.5, 7.1),
-    )  # fmt: skip
+    # HCM exhibit 20-18: right turns, straight on and left turns at a two-way stop on the right.
     follow_up: Reals[tuple[float, float, float]] = reals(
         "shortest time between two drivers of one lane", "s",
         count=3, low=0, high=60, default=(3.3, 4.0, 3.5),
-    )  # fmt: skip
-    # Log-normal over drivers, as usual (Tian et al. 1999, Transp. Res. A 33:187). In the HCM all
-    # drivers are alike; we know of no published value for these junctions.
-    deviation: float = real(
-        "standard deviation of a driver's critical gap over its mean; 0 makes all alike",
-        low=0, high=1, default=0.0, label="deviation of critical gaps",
     )  # fmt: skip
     # The HCM's all-way stop has a departure headway of 3.9 s where nothing is in the way, including
     # 2.0 s for moving up (exhibit 21-15, case 1); highway design takes 2.0 s at a stop sign
@@ -70,25 +57,20 @@ class Driver(NamedTuple):
 
     human: bool  #: otherwise the vehicle follows DIM
     careless: float  #: 0 … 1; it signals a turn only if at most this share of drivers does not
-    gap: float  #: factor on the critical gaps
 
 
 class Drivers:
     """The drivers of a run, by lane and rank in it; a human at one share is human at any larger."""
 
-    def __init__(self, humans: Humans, share: float, seed: int) -> None:
+    def __init__(self, share: float, seed: int) -> None:
         self._share = share
         self._draws = Draws(seed, "humans")
-        self._deviation = math.sqrt(math.log1p(humans.deviation**2))
         self._drivers: dict[tuple[int, int], Driver] = {}
 
     def __getitem__(self, which: tuple[int, int]) -> Driver:
         if which not in self._drivers:
-            draws, deviation = self._draws, self._deviation
-            human = draws.uniform(_HUMAN, *which) < self._share
-            normal = draws.normal(_GAP, *which) if deviation else 0.0
-            gap = math.exp(deviation * (normal - deviation / 2.0))
-            self._drivers[which] = Driver(human, draws.uniform(_CARELESS, *which), gap)
+            human = self._draws.uniform(_HUMAN, *which) < self._share
+            self._drivers[which] = Driver(human, self._draws.uniform(_CARELESS, *which))
         return self._drivers[which]
 
 
@@ -99,13 +81,16 @@ class Readings:
         self.turns = turns(site.intersection)
         self._silent = (humans.unsignalled[0], 1.0, humans.unsignalled[1])
         self.drivers = drivers
-        self._rows = site.intersection.movements.rows
+        self.rows = site.intersection.movements.rows
+        self._clearing = [
+            clearing_distances(site.intersection, it, site.fleet).tolist() for it in site.types
+        ]
         # Beyond the parting of two ways, a vehicle's place shows which of them it takes.
         self._parting = parting(site.intersection, CLEARANCE).tolist()
 
     def index(self, vehicle: Observed) -> int:
         """The index of its true movement."""
-        return self._rows[vehicle.lane][vehicle.manoeuvre]
+        return self.rows[vehicle.lane][vehicle.manoeuvre]
 
     def possible(self, vehicle: Observed, trust: str) -> list[int]:
         """Movements, by index, that a vehicle might take, as far as others can tell.
@@ -114,7 +99,7 @@ class Readings:
         """
         movement = self.index(vehicle)
         parts, inside = self._parting[movement], -vehicle.distance
-        alike = [q for q in self._rows[vehicle.lane][1:] if inside <= parts[q]]
+        alike = [q for q in self.rows[vehicle.lane][1:] if inside <= parts[q]]
         driver = self.drivers[vehicle.lane, vehicle.rank]
         turn = self.turns[movement]
         if driver.human:
@@ -124,3 +109,15 @@ class Readings:
             turn = shown
         meant = [q for q in alike if self.turns[q] is turn]
         return meant or alike  # motion contradicts silence, or the lane has no way straight on
+
+    def blocks(self, other: Observed, own: Iterable[int], trust: str) -> bool:
+        """Whether another may be, or come, in the way of a vehicle on one of its `own` movements.
+
+        A vehicle inside the junction no longer is once its rear has left their corridors.
+        """
+        # The distances are minus infinity where ways do not conflict.
+        return any(
+            self._clearing[other.type][mine][way] + min(other.distance, 0.0) > 0.0
+            for way in self.possible(other, trust)
+            for mine in own
+        )

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import replace
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from functools import cache
 
 import pytest
@@ -15,6 +16,8 @@ from dim import Dim, Humans, Mixed
 from dim.agent import GATES
 from dim.decision import ORDERS
 from dim.humans.drivers import Drivers
+from dim.humans.queue import Queue
+from minisim.control import Command, Observed, Session, Site, View
 from scenarios import four_way
 from scenarios.profiles import FAIR, PAPER
 from scenarios.scenario import Scenario
@@ -41,8 +44,7 @@ def traffic(draw: st.DrawFn) -> tuple[Scenario, Mixed]:
         recorded=demand.draw(intersection.n, DEMANDED, seed=draw(st.integers(0, 1000))),
     )  # fmt: skip
     humans = Humans(
-        critical_gaps=draw(st.sampled_from([(6.2, 6.5, 7.1), (0.0, 0.0, 0.0)])),
-        deviation=draw(st.sampled_from([0.0, 0.3])),
+        follow_up=draw(st.sampled_from([(3.3, 4.0, 3.5), (0.0, 0.0, 0.0)])),
         reaction=draw(st.sampled_from([0.5, 1.9])),
         trust=draw(st.sampled_from(SAFE)),
     )
@@ -50,9 +52,43 @@ def traffic(draw: st.DrawFn) -> tuple[Scenario, Mixed]:
     return scenario, Mixed(dim, draw(st.sampled_from(SHARES)), humans, draw(st.sampled_from(SAFE)))
 
 
+@dataclass(frozen=True)
+class Watched:
+    """The mixture, of which no vehicle may overtake a human in whose way it is."""
+
+    mixed: Mixed
+    name = "watched"
+
+    def start(self, site: Site) -> Session:
+        return _Watched(self.mixed, site)
+
+
+class _Watched:
+    def __init__(self, mixed: Mixed, site: Site) -> None:
+        self._session, self._site = mixed.start(site), site
+        self._drivers = Drivers(mixed.share, site.seed)
+        self._queue = Queue(mixed.dim.zones, self._drivers)
+        self.plan = self._session.plan
+
+    def decide(self, view: View) -> Iterable[Command]:
+        before = list(self._queue.heads.values())
+        self._queue.look(view)
+        entered = [v for v in before if v.id not in self._queue.heads]
+        for vehicle in entered:
+            for other in before[: before.index(vehicle)]:
+                if other not in entered and self._drivers[other.lane, other.rank].human:
+                    assert not self._conflict(vehicle, other), f"{vehicle} overtakes {other}"
+        return self._session.decide(view)
+
+    def _conflict(self, one: Observed, other: Observed) -> bool:
+        rows = self._site.intersection.movements.rows
+        mine, theirs = (rows[v.lane][v.manoeuvre] for v in (one, other))
+        return bool(self._site.conflicts[mine, theirs])
+
+
 def check(scenario: Scenario, mixed: Mixed, seed: int = 1) -> None:
     """A collision raises; a vehicle that was not served is a failure."""
-    run = minisim.simulate(scenario, mixed, seed)
+    run = minisim.simulate(scenario, Watched(mixed), seed)
     unserved = (~run.columns.arrived).nonzero()[0].tolist()
     assert unserved == [], f"vehicles {unserved} under {mixed}"
 
@@ -67,7 +103,7 @@ def test_safe_and_alive(given_traffic: tuple[Scenario, Mixed]) -> None:
 def seed_of(lanes: tuple[int, ...], kinds: tuple[bool, ...], quiet: bool) -> int:
     """A seed whose first vehicles on these lanes are human or not, and quiet or not, as asked."""
     for seed in itertools.count():
-        drivers = Drivers(Humans(), 0.5, seed)
+        drivers = Drivers(0.5, seed)
         found = [drivers[lane, 0] for lane in lanes]
         fitting = all(not d.human or (d.careless < 0.25) == quiet for d in found)
         if fitting and tuple(d.human for d in found) == kinds:
@@ -107,7 +143,7 @@ def test_no_vehicles_wait_in_a_circle(gate: str) -> None:
 @share(0.2)
 @given(seed=st.integers(0, 1000))
 def test_drivers_depend_only_on_seed_and_share(seed: int) -> None:
-    fewer, more, alike = (Drivers(Humans(), share, seed) for share in (0.2, 0.7, 0.2))
+    fewer, more, alike = (Drivers(share, seed) for share in (0.2, 0.7, 0.2))
     vehicles = [(lane, rank) for rank in range(100) for lane in range(5)]
     for which in vehicles:
         assert more[which].human or not fewer[which].human

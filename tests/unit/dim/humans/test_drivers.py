@@ -21,7 +21,7 @@ MANY = 20_000
 
 
 def human(share: float, seed: int = 3, count: int = MANY) -> np.ndarray:
-    drivers = Drivers(Humans(), share, seed)
+    drivers = Drivers(share, seed)
     return np.array([drivers[i % 4, i // 4].human for i in range(count)])
 
 
@@ -38,27 +38,15 @@ def test_shares_are_nested() -> None:
 
 
 def test_drivers_do_not_depend_on_the_order_of_asking() -> None:
-    forwards, backwards = (Drivers(Humans(deviation=0.3), 0.5, 7) for _ in range(2))
+    forwards, backwards = (Drivers(0.5, 7) for _ in range(2))
     wanted = [forwards[1, i] for i in range(1000)]
     assert [backwards[1, i] for i in reversed(range(1000))] == wanted[::-1]
-    for other in (Drivers(Humans(deviation=0.3), 0.5, 8), forwards):
+    for other in (Drivers(0.5, 8), forwards):
         assert wanted != [other[2, i] for i in range(1000)]
 
 
-def test_critical_gaps_are_log_normal_about_the_published_mean() -> None:
-    alike = Drivers(Humans(), 1.0, 1)
-    assert {alike[0, i].gap for i in range(100)} == {1.0}
-    differing = Drivers(Humans(deviation=0.25), 1.0, 1)
-    gaps = np.array([differing[0, i].gap for i in range(MANY)])
-    assert gaps.mean() == pytest.approx(1.0, abs=5 * 0.25 / math.sqrt(MANY))
-    assert gaps.std() == pytest.approx(0.25, rel=0.05)
-    logs = np.log(gaps)
-    skewness = float(((logs - logs.mean()) ** 3).mean() / logs.std() ** 3)
-    assert abs(skewness) < 5.0 * math.sqrt(6.0 / MANY)
-
-
 def readings(share: float = 1.0, site: Site = SITE) -> Readings:
-    return Readings(Humans(), site, Drivers(Humans(), share, 1))
+    return Readings(Humans(), site, Drivers(share, 1))
 
 
 def seen(vehicle: int, manoeuvre: int, distance: float = 5.0, lane: int = 0) -> Observed:
@@ -75,7 +63,7 @@ def test_turns_without_a_signal_have_the_published_rates(manoeuvre: int, rate: f
 
 def test_what_is_believed() -> None:
     read = readings()
-    drivers = Drivers(Humans(), 1.0, 1)
+    drivers = Drivers(1.0, 1)
     silent = next(i for i in range(100) if drivers[1, i].careless < 0.25)
     telling = next(i for i in range(100) if drivers[1, i].careless > 0.29)
     everything = [3, 4, 5]  # of lane b
@@ -117,6 +105,6 @@ def test_vehicles_of_dim_always_tell() -> None:
 
 def test_where_no_way_leads_straight_on_silence_says_nothing() -> None:
     read = readings(site=three_way().site())
-    drivers = Drivers(Humans(), 1.0, 1)
+    drivers = Drivers(1.0, 1)
     silent = next(i for i in range(100) if drivers[0, i].careless < 0.25)
     assert read.possible(seen(silent, 1), "silence") == [0, 1]

@@ -23,7 +23,7 @@ from tests.builders import digest, replayed, seen, view
 SITE = four_way(profile="fair").site()
 #: Drivers of this share and seed, with ids (and ranks) that are of one kind on every lane.
 MIXED = Mixed(share=0.5)
-DRIVERS = Drivers(Humans(), MIXED.share, SITE.seed)
+DRIVERS = Drivers(MIXED.share, SITE.seed)
 HUMAN = np.array([[DRIVERS[lane, i].human for lane in range(4)] for i in range(400)])
 PEOPLE = np.flatnonzero(HUMAN.all(axis=1)).tolist()
 #: A driver that announces every turn, on every lane.
@@ -84,46 +84,75 @@ def test_followers_keep_the_follow_up_time() -> None:
     assert scene.goes(5.4, follower) == {PEOPLE[1]}
 
 
-@pytest.mark.parametrize(("manoeuvre", "gap"), [(LEFT, 6.2), (STRAIGHT, 6.5), (RIGHT, 7.1)])
-def test_critical_gaps_by_manoeuvre(manoeuvre: int, gap: float) -> None:
-    """Left-hand traffic: left is near. A vehicle of DIM comes on lane d, which conflicts."""
-    lane, way = (C, RIGHT) if manoeuvre == LEFT else (D, STRAIGHT)
-    driver = seen(PEOPLE[0], A, manoeuvre, 2.0)
-    for later, accepted in ((-0.1, False), (0.1, True)):
-        scene = Scene()
-        scene.goes(0.0, driver)
-        coming = seen(CARS[0], lane, way, (gap + later) * 5.0, 5.0)
-        assert (PEOPLE[0] in scene.goes(1.9, driver, coming)) is accepted
+@pytest.mark.parametrize("speed", [0.0, 4.0])
+def test_a_driver_waits_for_what_came_first_until_it_is_out_of_the_way(speed: float) -> None:
+    """Whether the vehicle of DIM stands or rolls, and whether or not it has the right of way."""
+    scene, driver = Scene(), seen(PEOPLE[0], A, STRAIGHT, 2.0)
+    crossing = seen(CARS[1], C, RIGHT, -2.0, 5.0)
+    car = seen(CARS[0], B, STRAIGHT, 6.0, 4.0)
+    assert scene.goes(0.0, car, crossing) == set()
+    assert scene.goes(0.1, driver, car, crossing) == set()
+    assert scene.goes(4.0, driver, car._replace(distance=2.0, speed=speed), crossing) == set()
+    assert scene.goes(5.0, driver, car._replace(distance=2.0)) == {CARS[0]}
+    assert scene.goes(6.0, driver, car._replace(distance=-4.0, speed=5.0)) == set()
+    assert scene.goes(7.0, driver) == {PEOPLE[0]}
 
 
-def test_a_driver_lets_pass_what_rolls_through_the_yellow_zone_but_not_what_stands() -> None:
-    driver = seen(PEOPLE[0], A, STRAIGHT, 2.0)
-    scene = Scene()
-    scene.goes(0.0, driver)
-    assert scene.goes(2.0, driver, seen(CARS[0], B, STRAIGHT, 6.0, 0.2)) == set()
-    assert scene.goes(3.0, driver, seen(CARS[0], B, STRAIGHT, 2.0, 0.0)) == {PEOPLE[0]}
+@pytest.mark.parametrize("distance", [8.0, 3.0])
+def test_a_driver_waits_for_none_that_comes_later_and_that_one_waits(distance: float) -> None:
+    scene, driver = Scene(), seen(PEOPLE[0], A, STRAIGHT, 2.0)
+    scene.goes(0.0, driver, seen(CARS[0], B, STRAIGHT, 8.1, 5.0))
+    assert scene.goes(1.9, driver, seen(CARS[0], B, STRAIGHT, distance, 5.0)) == {PEOPLE[0]}
+    waiting = seen(CARS[0], B, STRAIGHT, 2.0)
+    assert scene.goes(2.1, driver._replace(distance=0.0, speed=2.0), waiting) == set()
+    assert scene.goes(3.0, driver._replace(distance=-2.0, speed=4.0), waiting) == set()
+    assert scene.goes(6.0, waiting) == {CARS[0]}
 
 
-def test_a_gap_in_a_stream_that_is_not_in_the_way_needs_no_waiting() -> None:
-    driver = seen(PEOPLE[0], A, LEFT, 2.0)
-    scene = Scene()
-    scene.goes(0.0, driver)
-    assert PEOPLE[0] in scene.goes(1.9, driver, seen(CARS[0], B, LEFT, 6.0, 3.0))
+def test_a_driver_waits_for_none_that_is_not_in_its_way() -> None:
+    scene, driver = Scene(), seen(PEOPLE[0], A, LEFT, 2.0)
+    car = seen(CARS[0], B, LEFT, 6.0, 3.0)
+    scene.goes(0.0, car, seen(CARS[1], C, RIGHT, -2.0, 5.0))  # which keeps the car waiting
+    scene.goes(0.1, driver, car._replace(distance=2.0, speed=0.0))
+    assert PEOPLE[0] in scene.goes(2.0, driver, car._replace(distance=2.0, speed=0.0))
+
+
+@EVERY_GATE
+def test_dim_waits_for_no_driver_that_is_still_rolling(gate: str) -> None:
+    scene = Scene(replace(MIXED, dim=Dim(gate=gate)))
+    driver = seen(PEOPLE[0], B, STRAIGHT, 3.1, 0.5)
+    assert scene.goes(0.0, driver) == set()
+    assert scene.goes(1.0, driver, seen(CARS[0], A, STRAIGHT, 8.0, 5.0)) == {CARS[0]}
+
+
+def test_where_humans_wait_none_overtakes_a_vehicle_that_came_first() -> None:
+    """Without the human, a3 waits for d2 inside, and c1, in harmony with d2, goes before it."""
+    inside, first = seen(CARS[1], D, STRAIGHT, -1.0, 4.0), seen(CARS[0], A, RIGHT, 2.0)
+    last, driver = seen(CARS[2], C, LEFT, 6.0, 4.0), seen(TELLING, B, LEFT, 2.0)
+    mixed = replace(MIXED, dim=Dim(gate="harmonious"), trust="signals")
+    for human in (False, True):
+        scene, others = Scene(mixed), [inside, first, *[driver] * human]
+        scene.goes(0.0, inside, first)
+        scene.goes(0.1, *others)
+        assert (last.id in scene.goes(0.2, *others, last)) is not human
+
+
+def test_while_a_human_is_at_the_junction_the_gate_is_harmonious() -> None:
+    scene, car = Scene(), seen(CARS[0], A, LEFT, 6.0, 4.0)
+    other, driver = seen(CARS[1], B, LEFT, -1.0, 4.0), seen(TELLING, B, LEFT, -8.5, 4.0)
+    assert scene.goes(0.0, car, other) == set()
+    assert scene.goes(0.1, car, driver) == {CARS[0]}
+    assert Scene().goes(0.0, car, other, seen(PEOPLE[0], C, LEFT, 2.0)) == {CARS[0]}
 
 
 def test_what_the_host_has_to_provide() -> None:
-    """DIM without its rest, a mark at the entry, sight as far as the longest gap at the limit."""
+    """DIM without its rest, and a mark at the entry."""
     alone, plan = MIXED.dim.start(SITE).plan, MIXED.start(SITE).plan
     assert plan.marks == (*alone.marks, 0.0)
-    assert plan.sight == pytest.approx(7.1 * SITE.speed_limit)
     awake = replace(alone, wake_when_empty=False)
-    assert replace(plan, marks=alone.marks, sight=alone.sight) == awake != alone
+    assert replace(plan, marks=alone.marks) == awake != alone
     harmonious = Dim(gate="harmonious")
     assert Mixed(harmonious).start(SITE).plan.marks == harmonious.start(SITE).plan.marks
-    differing = Mixed(humans=Humans(deviation=0.25)).start(SITE).plan
-    assert differing.sight == pytest.approx(1.75 * 7.1 * SITE.speed_limit)  # 3 deviations
-    hasty = Mixed(humans=Humans(critical_gaps=(0.0, 0.0, 0.0))).start(SITE).plan
-    assert hasty.sight == alone.sight
     noisy = Dim(perception=NoisyPerception(0.15, frame=0.2))
     assert Mixed(noisy).start(SITE).plan.period == 0.2
     assert Mixed(noisy).name == "dim:perception=noisy(intent_error=0.15,frame=0.2)+humans=0.2"
@@ -167,15 +196,6 @@ def test_a_driver_that_rolls_on_begins_anew() -> None:
     assert scene.goes(3.9, driver) == {PEOPLE[0]}
 
 
-@EVERY_GATE
-def test_dim_yields_to_a_human_in_the_yellow_zone_wherever_it_may_go(gate: str) -> None:
-    """Left turns from a and b are in harmony, but b's driver may mean another way."""
-    scene = Scene(replace(MIXED, dim=Dim(gate=gate)))
-    car, driver = seen(CARS[0], A, STRAIGHT, 6.0, 4.0), seen(PEOPLE[0], B, LEFT, 7.5, 4.0)
-    assert scene.goes(0.0, car, driver) == set()
-    assert scene.goes(0.5, car._replace(distance=2.0, speed=0.0)) == {CARS[0]}
-
-
 def test_no_vehicle_of_dim_goes_from_behind_a_human() -> None:
     driver, car = seen(PEOPLE[0], A, STRAIGHT, 0.5), seen(CARS[0], A, STRAIGHT, 7.9)
     assert Scene(replace(MIXED, dim=Dim(gate="harmonious"))).goes(0.0, driver, car) == set()
@@ -184,26 +204,19 @@ def test_no_vehicle_of_dim_goes_from_behind_a_human() -> None:
 @pytest.mark.parametrize(("trust", "believed"), [("motion", False), ("signals", True)])
 @pytest.mark.parametrize("lane", [B, C, D])
 @pytest.mark.parametrize("manoeuvre", [LEFT, RIGHT])
-@pytest.mark.parametrize("distance", [-0.5, 8.0])  # inside; where the yellow zone begins
+@pytest.mark.parametrize("distance", [-0.5, 2.0])  # inside; at the line
+@EVERY_GATE
 def test_an_indicator_that_is_believed_means_its_way_and_else_any(
-    lane: int, manoeuvre: int, distance: float, trust: str, believed: bool
+    lane: int, manoeuvre: int, distance: float, trust: str, believed: bool, gate: str
 ) -> None:
-    other = seen(TELLING, lane, manoeuvre, distance, 4.0)
+    other = seen(TELLING, lane, manoeuvre, distance)
     matrix, ways = Dim().harmony(SITE), [manoeuvre] if believed else [LEFT, STRAIGHT, RIGHT]
     for mine in (LEFT, STRAIGHT, RIGHT):
         car = seen(CARS[0], A, mine, 6.0, 4.0)
         harmony = all(matrix.harmony(Movement(A, mine), Movement(lane, way)) for way in ways)
-        scene = Scene(replace(MIXED, dim=Dim(gate="harmonious"), trust=trust))
-        assert (CARS[0] in scene.goes(0.0, car, other)) is harmony, mine
-
-
-def test_the_yellow_zone_begins_where_it_is_marked() -> None:
-    car = seen(CARS[0], A, STRAIGHT, 6.0, 4.0)
-    start = MIXED.dim.zones.yellow_start
-    for distance, there in ((0.0, True), (start, True), (start + 1e-3, False)):
-        driver = seen(PEOPLE[0], B, LEFT, distance, 4.0)
-        assert Scene().goes(0.0, car, driver) == (set() if there else {CARS[0]})
-        assert bool(wakes(MIXED.start(SITE), 0.0, driver)) is there
+        scene = Scene(replace(MIXED, dim=Dim(gate=gate), trust=trust))
+        scene.goes(0.0, other)
+        assert (CARS[0] in scene.goes(0.1, car, other)) is harmony, mine
 
 
 @EVERY_GATE
@@ -238,7 +251,7 @@ def test_drivers_that_believe_in_silence_collide() -> None:
 def test_the_groups_of_a_run_make_up_the_whole() -> None:
     run = minisim.simulate(four_way(150, profile="fair", horizon=600.0), Mixed(share=0.4), 2)
     groups = run.summary()["kinds"]
-    drivers, met = Drivers(Humans(), 0.4, run.seed), run.scenario.arrivals(run.seed)
+    drivers, met = Drivers(0.4, run.seed), run.scenario.arrivals(run.seed)
     human = np.array([drivers[k].human for k in zip(met.lane, met.rank, strict=True)])
     assert groups["human"]["trips"] == int(human.sum()) > 10
     waits = run.columns.waiting_time[human & run.columns.departed]

@@ -71,7 +71,7 @@ def test_all_controllers_of_a_study_share_their_arrivals() -> None:
 
 def test_the_humans_study_tells_its_shares_apart() -> None:
     study = study_named("humans")
-    assert len(study.points) == len(set(study.points)) == 2 * (2 * 7 + 1)
+    assert len(study.points) == len(set(study.points)) == 4 * (2 * 11 + 1)
     runs = study.runs(2)
     assert len({(e.name, e.scenario.density, e.seed) for _, e in runs}) == len(runs)
     shares = {c.humans: c.recipe(1).driven for c in study.points if c.series == "dim"}
@@ -108,7 +108,7 @@ def test_efforts_choose_points_and_seeds() -> None:
     }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", ["text", "as-run", "fair"])
+@pytest.mark.parametrize("name", ["text", "as-run", "fair", "humans"])
 def test_a_verdict_without_runs_says_how_to_make_them(name: str) -> None:
     study, effort = study_named(name), Effort()
     assert study.verdict is not None
