@@ -213,9 +213,7 @@ def _at_limit(site: Site, depart_speed: float | None) -> Floats:
 
 
 @lru_cache(maxsize=32)
-def _bound(
-    site: Site, depart_speed: float | None, time: bytes, lane: bytes, kind: bytes
-) -> float:
+def _bound(site: Site, depart_speed: float | None, time: bytes, lane: bytes, kind: bytes) -> float:
     """`Optimum.bound`, kept: a process often runs several controllers on the same arrivals."""
     came, kinds = np.frombuffer(time), np.frombuffer(kind, np.int64)
     needs = necessary(site, depart_speed)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,7 @@ from dim import Dim, ExactPerception
 from minisim.control import Controller
 from minisim.errors import InputError, instance, integer
 from minisim.names import name_of
+from minisim.results.metric import Metric
 from minisim.results.metrics import METRICS
 from scenarios.controllers import SAFE, controller_named, plugins
 from scenarios.optimum import ABOVE, DELAY, LEAST, Clairvoyant
@@ -27,7 +28,7 @@ from scenarios.sweep.file import experiments_of, read_toml
 from scenarios.sweep.keys import digest_of
 
 #: What is measured: the whole table of metrics, and what the optimum needs.
-MEASURED = (*METRICS, DELAY, LEAST, ABOVE)
+MEASURED: tuple[str | Metric, ...] = (*METRICS, DELAY, LEAST, ABOVE)
 
 #: Knows all arrivals beforehand: shown, but not ranked.
 SCHEDULE = "schedule"
@@ -112,7 +113,9 @@ def read_benchmark(path: str | os.PathLike[str] | None = None, *, quick: bool = 
     """
     path = standard_file() if path is None else Path(path)
     table = read_toml("the benchmark", path)
-    digest = digest_of(json.dumps([table, *_demands(table, path.parent)], sort_keys=True, default=str))
+    digest = digest_of(
+        json.dumps([table, *_demands(table, path.parent)], sort_keys=True, default=str)
+    )
     name, version = table.pop("name", ""), table.pop("version", None)
     shorter = table.pop("quick", {})
     try:

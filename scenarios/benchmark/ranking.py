@@ -11,7 +11,7 @@ doi 10.1111/biom.13419).
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -65,7 +65,8 @@ def _verdicts(values: Mapping[str, Values]) -> set[tuple[str, str]]:
     """Pairs of which the first is better, by Holm's procedure."""
     chances = []
     for one, other in combinations(values, 2):
-        common = [values[one][seed] - values[other][seed] for seed in values[one].keys() & values[other].keys()]
+        both = sorted(values[one].keys() & values[other].keys())
+        common = [values[one][seed] - values[other][seed] for seed in both]
         if len(common) > 1:
             pair = (one, other) if math.fsum(common) < 0.0 else (other, one)
             chances.append((chance(common), pair))
@@ -81,7 +82,7 @@ def chance(differences: Sequence[float]) -> float:
     """How probable a mean so far from 0 is by chance: two-sided paired t-test (Student 1908)."""
     from scipy.special import stdtr
 
-    mean, half_width, count = mean_interval(differences)
+    mean, _, count = mean_interval(differences)
     spread = float(np.std(differences, ddof=1))
     if spread == 0.0:
         return 1.0 if mean == 0.0 else 0.0
@@ -89,20 +90,19 @@ def chance(differences: Sequence[float]) -> float:
 
 
 def by_cell(rows: pd.DataFrame, measure: str = RANKED) -> dict[str, dict[str, dict[int, float]]]:
-    """Cell -> controller -> seed -> value, of controllers that served all vehicles of all runs."""
-    served = serving(rows)
+    """Cell -> controller -> seed -> value, of controllers whose runs all count (`trouble`)."""
     values: dict[str, dict[str, dict[int, float]]] = {}
-    for (cell, name), runs in rows.groupby(["cell", "controller"], sort=False):
-        if (cell, name) in served:
-            column = runs.set_index("seed")[measure].astype(float).dropna()
-            values.setdefault(cell, {})[name] = column.to_dict()
+    for cell, name, runs in groups(rows):
+        if not trouble(runs):
+            pairs = zip(runs["seed"].tolist(), runs[measure].astype(float).tolist(), strict=True)
+            values.setdefault(cell, {})[name] = dict(pairs)
     return values
 
 
-def serving(rows: pd.DataFrame) -> set[tuple[str, str]]:
-    """Cells and controllers whose runs all went well: see `trouble`."""
-    grouped = rows.groupby(["cell", "controller"], sort=False)
-    return {key for key, runs in grouped if not trouble(runs)}
+def groups(rows: pd.DataFrame) -> Iterator[tuple[str, str, pd.DataFrame]]:
+    """The runs of each controller in each cell, in order."""
+    for (cell, name), runs in rows.groupby(["cell", "controller"], sort=False):
+        yield str(cell), str(name), runs
 
 
 def trouble(runs: pd.DataFrame) -> str:
@@ -116,24 +116,27 @@ def trouble(runs: pd.DataFrame) -> str:
     return ""
 
 
-def overall(rows: pd.DataFrame, cells: Sequence[str]) -> dict[str, Standing]:
-    """Standing over these cells, of controllers that served all: the mean log of delay/least.
+def scores(rows: pd.DataFrame, cells: Sequence[str]) -> dict[str, dict[int, float]]:
+    """Controller -> seed -> mean over these cells of log(delay/least), if it served all of them.
 
-    The exponential of a mean is the geometric mean over cells, which every cell's unit leaves the
-    order of (Fleming and Wallace 1986, CACM 29:218). Cells without a known least delay are left
-    out of it for all.
+    The exponential is a geometric mean, which ranks controllers alike in any unit (Fleming and
+    Wallace 1986, CACM 29:218). Cells without a known least delay are left out for all.
     """
-    known = {c: v for c, v in by_cell(rows).items() if c in cells}
+    known = by_cell(rows)
     least = {
         (cell, seed): value
         for cell, seed, value in rows[["cell", "seed", LEAST]].dropna().itertuples(index=False)
+        if cell in cells and value > 0.0
     }
-    names = [name for name in dict.fromkeys(rows["controller"]) if name != SCHEDULE]
-    served = [name for name in names if all(name in known.get(cell, ()) for cell in cells)]
-    values: dict[str, dict[int, float]] = {name: {} for name in served}
-    for seed in sorted(set(rows["seed"])):
-        counted = [cell for cell in cells if least.get((cell, seed), 0.0) > 0.0]
-        for name in served if counted else ():
-            logs = [math.log(known[cell][name][seed] / least[cell, seed]) for cell in counted]
-            values[name][seed] = math.fsum(logs) / len(logs)
-    return ranked(values) if values else {}
+    values: dict[str, dict[int, float]] = {}
+    for name in dict.fromkeys(rows["controller"]):
+        if all(name in known.get(cell, ()) for cell in cells):
+            for seed in sorted({seed for _, seed in least}):
+                logs = [math.log(known[c][name][seed] / least[c, s]) for c, s in least if s == seed]
+                values.setdefault(name, {})[seed] = math.fsum(logs) / len(logs)
+    return values
+
+
+def overall(rows: pd.DataFrame, cells: Sequence[str]) -> dict[str, Standing]:
+    """Standing by `scores`, best first; a schedule that knows all arrivals has none."""
+    return ranked({name: it for name, it in scores(rows, cells).items() if name != SCHEDULE})

@@ -120,7 +120,7 @@ def load(path: AnyPath) -> Result:
         if data.pop("layout") != LAYOUT:
             raise ValueError("another version of minisim wrote it")
         frame = pd.DataFrame(data.pop("rows"), columns=data.pop("columns"))
-        if not {*KEY, "error", RANKED} <= {*frame} or not HEAD <= data.keys():
+        if not {*KEY, "error", RANKED} <= {*frame} or not data.keys() >= HEAD:
             raise ValueError("columns or keys are missing")
     except (ValueError, TypeError, KeyError, AttributeError) as error:
         raise FileError(f"{file} is not the result of a benchmark: {error}") from error
@@ -167,7 +167,7 @@ def compare(first: Result, second: Result) -> Comparison:
             )
     one, other = (it.rows.set_index(list(KEY)).sort_index() for it in (first, second))
     common = one.index.intersection(other.index)
-    columns = [c for c in one if c in other and c not in VARIES]
+    columns = [c for c in map(str, one.columns) if c in other and c not in VARIES]
     differ: dict[tuple[str, str], set[str]] = {}
     uneven = 0
     a, b = (it.loc[common, columns].astype(object).to_numpy().tolist() for it in (one, other))
@@ -187,9 +187,11 @@ def compare(first: Result, second: Result) -> Comparison:
 def _change(
     cell: str, name: str, columns: set[str], one: pd.DataFrame, other: pd.DataFrame
 ) -> Change:
-    gaps = (other.loc[(cell, name), RANKED] - one.loc[(cell, name), RANKED]).dropna().tolist()
-    interval = mean_interval(gaps) if gaps else None
-    return Change(cell, name, tuple(sorted(columns)), interval, chance(gaps) if len(gaps) > 1 else None)
+    first, second = (it[RANKED].xs((cell, name)).astype(float) for it in (one, other))
+    gaps = (second - first).dropna().tolist()
+    difference = mean_interval(gaps) if gaps else None
+    p = chance(gaps) if len(gaps) > 1 else None
+    return Change(cell, name, tuple(sorted(columns)), difference, p)
 
 
 def _same(x: Any, y: Any) -> bool:

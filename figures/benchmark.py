@@ -1,0 +1,331 @@
+"""The page of a benchmark: who is how good, where, and by which measure."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+
+from figures import plots, style
+from figures.gallery import write
+from figures.tables import Table
+from minisim.errors import plural
+from minisim.files import make_folder, write_table, write_text
+from minisim.results.metrics import METRICS
+from scenarios.benchmark.definition import MEASURED, SCHEDULE
+from scenarios.benchmark.ranking import (
+    LEAST,
+    RANKED,
+    Standing,
+    by_cell,
+    groups,
+    overall,
+    ranked,
+    scores,
+    trouble,
+)
+from scenarios.benchmark.results import FILE, Result, save
+from scenarios.controllers import label_of
+from scenarios.statistics import Interval, mean_interval
+
+#: Measures at a glance: column -> heading. For all of them, less is better.
+GLANCE = {
+    "delay_s": "delay\n[s]", "delay_s_p95": "delay,\n95 % [s]", "worst_lane_s": "worst\nlane [s]",
+    "order_reversals": "order\nreversals", "stops": "stops", "queue_max": "longest\nqueue",
+    "fuel_g": "fuel\n[g]", "jerk_mps3": "jerk\n[m/s³]", "hard_brakings": "hard\nbrakings",
+    "messages": "messages\nper trip", "median_decision_us": "decision\n[µs]",
+}  # fmt: skip
+
+#: Per trip, though measured for a run.
+PER_TRIP = ("messages", "message_bytes")
+
+#: Percent above the least delay that have the palest and the darkest colour.
+PALE, DARK = 10.0, 3000.0
+
+#: Colours of the heat maps: from light to dark, and readable in grey.
+SCALE = "YlGnBu"
+
+#: Measures that differ by less are no better or worse: relative to the larger one.
+ALIKE = 0.005
+
+
+def write_page(
+    result: Result, folder: Path, facts: str, progress: Callable[[int, int], None]
+) -> None:
+    """Write benchmark.json, report.md, cells.csv and the figures into a folder; `FileError`."""
+    pictures = make_folder(folder / "figures")
+    save(result, folder / FILE)
+    write_table(means(result), folder / "cells.csv")
+    drawings = {
+        "overall": overall_figure, "cells": cells_figure, "measures": measures_figure,
+    }  # fmt: skip
+    for done, (name, draw) in enumerate(drawings.items(), start=1):
+        write(draw(result), pictures, name)
+        progress(done, len(drawings))
+    text = "\n\n".join(_report(result, facts))
+    write_text(folder / "report.md", text.rstrip() + "\n")
+
+
+def names(result: Result) -> list[str]:
+    """All controllers, the best first; those without an overall rank, and the schedule, last."""
+    standings = overall(result.rows, result.plain)
+    left = [name for name in result.head["controllers"] if name not in standings]
+    return [*standings, *left, SCHEDULE]
+
+
+def overall_figure(result: Result) -> Figure:
+    """How many times the least delay each controller has, over all plain cells, and its rank."""
+    standings = overall(result.rows, result.plain)
+    lines = {name: (it.mean, it.words) for name, it in standings.items()}
+    if known := scores(result.rows, result.plain).get(SCHEDULE):
+        lines[SCHEDULE] = mean_interval(known.values()), "no rival"
+    left, high = _margin(lines), 1.9 + 0.3 * max(len(lines), 1)
+    width = left + 6.6
+    figure = style.new_figure(width, high)
+    axes = figure.add_axes((left / width, 0.9 / high, 5.4 / width, 1.0 - 1.55 / high))
+    for place, (name, (mean, words)) in enumerate(lines.items()):
+        look = style.look(name)
+        low, value, top = _times(mean)
+        axes.errorbar(value, place, xerr=[[value - low], [top - value]], color=look.colour,
+                      marker=look.marker, markersize=6.5, capsize=2.6, elinewidth=1.2)  # fmt: skip
+        axes.annotate(words, (1.02, place), xycoords=("axes fraction", "data"), va="center",
+                      fontsize=9.0, color=style.INK)  # fmt: skip
+    style.plot_axes(axes, "", "times the least delay that is possible, logarithmic", "")
+    axes.set_xscale("log")
+    axes.set_xlim(1.0, max(axes.get_xlim()[1], 2.0))
+    ticks = [1, 1.5, 2, 3, 5, 7, 10, 15, 20, 30, 50, 100]
+    axes.set_xticks([t for t in ticks if t <= axes.get_xlim()[1]], minor=False)
+    axes.set_xticks([], minor=True)
+    axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    axes.grid(axis="x", color=style.FAINT, linewidth=0.8)
+    axes.grid(axis="y", visible=False)
+    axes.set_yticks(range(len(lines)), [_label(name) for name in lines])
+    axes.set_ylim(len(lines) - 0.5, -0.5)
+    style.write(figure, (left + 5.5) / width, 1.0 - 0.5 / high, "rank", 9.5, bold=True)
+    note = (
+        f"{_extent(result)}  Geometric mean over {plural(len(result.plain), 'cell')} without "
+        "errors and humans; 95 % intervals over seeds. In brackets the ranks that are possible, "
+        "with 95 % confidence for all together."
+    )
+    _framed(figure, _title(result, "overall"), note)
+    return figure
+
+
+def cells_figure(result: Result) -> Figure:
+    """Percent above the least delay: controllers by cells."""
+    order, cells = names(result), list(result.head["cells"])
+    known, by = by_cell(result.rows), result.rows.groupby("cell")
+    least = {str(cell): _mean(rows[LEAST]) for cell, rows in by}
+    values = np.full((len(order), len(cells)), np.nan)
+    for i, name in enumerate(order):
+        for j, cell in enumerate(cells):
+            delay = known.get(cell, {}).get(name)
+            if delay and least[cell] > 0.0:
+                values[i, j] = 100.0 * (np.mean([*delay.values()]) / least[cell] - 1.0)
+    heads = [
+        f"{_wrapped(cell)}\n({least[cell]:.1f} s)" if least[cell] > 0.0 else _wrapped(cell)
+        for cell in cells
+    ]
+    shades = np.log(np.maximum(values, PALE) / PALE) / math.log(DARK / PALE)
+    note = (
+        f"{_extent(result)}  In brackets the least mean delay that is possible.  ×: collided, "
+        "refused or left vehicles behind; the report says which."
+    )
+    title = _title(result, "mean delay above the least possible [%]")
+    return _heat(order, heads, values, shades, title, note)
+
+
+def measures_figure(result: Result) -> Figure:
+    """Some measures by controller: means over the plain cells, coloured by their order."""
+    order = [name for name in names(result) if name in scores(result.rows, result.plain)]
+    plain = _per_trip(result.rows[result.rows["cell"].isin(result.plain)])
+    columns = [column for column in GLANCE if column in plain]
+    values = np.array([
+        [_mean(plain[plain["controller"] == name][column]) for column in columns] for name in order
+    ]).reshape(len(order), len(columns))  # fmt: skip
+    better = (values[None] < values[:, None] * (1.0 - ALIKE)).sum(axis=1)
+    note = (
+        f"{_extent(result)}  Means over {plural(len(result.plain), 'cell')} without errors and "
+        "humans. The paler, the fewer controllers are better. cells.csv has all measures of all "
+        "cells, with intervals."
+    )
+    heads = [GLANCE[column] for column in columns]
+    shades = better / max(len(order) - 1, 1)
+    return _heat(order, heads, values, shades, _title(result, "measures"), note)
+
+
+def _heat(
+    order: Sequence[str], heads: Sequence[str], values: Any, shades: Any, title: str, note: str
+) -> Figure:
+    """Numbers in cells, from pale (shade 0) to dark (1); grey for none."""
+    left, high = _margin(order), 1.95 + 0.29 * len(order)
+    width = left + 0.2 + 0.78 * len(heads)
+    figure = style.new_figure(width, high)
+    axes = figure.add_axes((left / width, 0.5 / high, 0.78 * len(heads) / width, 1 - 1.65 / high))
+    axes.set_facecolor(style.FAINT)
+    axes.imshow(np.ma.masked_invalid(shades), cmap=SCALE, vmin=0.0, vmax=1.0, aspect="auto")
+    for (i, j), value in np.ndenumerate(values):
+        axes.text(j, i, _shown(value), ha="center", va="center", fontsize=8.5,
+                  color=style.PAPER if shades[i, j] > 0.5 else style.INK)  # fmt: skip
+    axes.set_xticks(range(len(heads)), heads, fontsize=8.0)
+    axes.xaxis.tick_top()
+    axes.set_yticks(range(len(order)), [_label(name) for name in order], fontsize=9.0)
+    axes.set_xticks(np.arange(len(heads) - 1) + 0.5, minor=True)
+    axes.set_yticks(np.arange(len(order) - 1) + 0.5, minor=True)
+    axes.tick_params(which="both", length=0, labelcolor=style.INK)
+    axes.spines[:].set_visible(False)
+    axes.grid(which="minor", color=style.PAPER, linewidth=1.5)
+    _framed(figure, title, note)
+    return figure
+
+
+def _framed(figure: Figure, title: str, note: str) -> None:
+    plots.frame(figure, "", (), note)
+    top = 1.0 - 0.22 / figure.get_figheight()
+    style.write(figure, plots.LEFT, top, title, 13, bold=True)
+
+
+def _times(mean: Interval) -> tuple[float, float, float]:
+    """Low end, value and high end of an interval of logarithms."""
+    half = 0.0 if math.isnan(mean.half_width) else mean.half_width
+    low, value, high = (math.exp(mean.mean + sign * half) for sign in (-1.0, 0.0, 1.0))
+    return low, value, high
+
+
+def _wrapped(text: str) -> str:
+    return textwrap.fill(text, 11)
+
+
+def _shown(value: float) -> str:
+    if math.isnan(value):
+        return "×"
+    if 0.0 < value < 0.095:
+        return f"{value:.1g}" if value >= 0.001 else "0"
+    return f"{value:.2g}" if value < 10.0 else f"{value:.0f}"
+
+
+def means(result: Result) -> pd.DataFrame:
+    """Mean and half width of the 95 % interval of every measure, by cell and controller."""
+    columns = [it if isinstance(it, str) else it.name for it in MEASURED]
+    rows = _per_trip(result.rows)
+    known = map(str, rows.columns)
+    wanted = [c for c in known if c.removeprefix("complete_").startswith(tuple(columns))]
+    made = []
+    for cell, name, runs in groups(rows):
+        line: dict[str, Any] = {"cell": cell, "controller": name, "trouble": trouble(runs)}
+        for column in wanted:
+            values = pd.to_numeric(runs[column], errors="coerce").dropna().tolist()
+            if values:
+                interval = mean_interval(values)
+                line |= {column: interval.mean, f"{column}_ci95": interval.half_width}
+        made.append(line)
+    return pd.DataFrame(made)
+
+
+def _per_trip(rows: pd.DataFrame) -> pd.DataFrame:
+    """Rows in which measures of exchange are per trip."""
+    trips = pd.to_numeric(rows["trips"], errors="coerce") if "trips" in rows else math.nan
+    there = [column for column in PER_TRIP if column in rows]
+    return rows.assign(**{
+        column: pd.to_numeric(rows[column], errors="coerce") / trips for column in there
+    })  # fmt: skip
+
+
+def _mean(values: pd.Series[Any]) -> float:
+    return float(pd.to_numeric(values, errors="coerce").mean())
+
+
+def _label(name: str) -> str:
+    return "schedule (knows all arrivals)" if name == SCHEDULE else label_of(name)
+
+
+def _margin(order: Iterable[str]) -> float:
+    """Room for the labels [in]."""
+    return 0.4 + 0.072 * max(map(len, map(_label, order)), default=0)
+
+
+def _title(result: Result, what: str) -> str:
+    head = result.head
+    return f"Benchmark {head['benchmark']} {head['benchmark_version']}: {what}"
+
+
+def _extent(result: Result) -> str:
+    warning = "A smoke test: its numbers mean nothing.  " if result.head["quick"] else ""
+    return f"{warning}{plural(len(result.head['seeds']), 'seed')}."
+
+
+def _report(result: Result, facts: str) -> Iterator[str]:
+    head, standings = result.head, overall(result.rows, result.plain)
+    yield f"# {_title(result, 'results')}"
+    if head["quick"]:
+        yield "**A smoke test: few and short runs. Its numbers mean nothing.**"
+    yield (
+        f"minisim {head['minisim']}, results {head['results']}, commit "
+        f"{head['commit'] or 'unknown'}; definition {head['digest']}; seeds "
+        f"{', '.join(map(str, head['seeds']))}. {facts}"
+    )
+    yield (
+        "All controllers have the same arrivals. A run goes on until its last vehicle has arrived, "
+        "and every vehicle counts. The least delay is a bound that no controller can beat "
+        "(docs/optimum.md); the schedule knows all arrivals beforehand. "
+        f"`{FILE}` has every row: compare it with another one by `minisim benchmark --compare`."
+    )
+    for name in ("overall", "cells", "measures"):
+        yield f"![{name}](figures/{name}.png)"
+    yield _overall_table(standings).markdown()
+    yield _rank_table(result).markdown()
+    yield _trouble_table(result).markdown()
+
+
+def _overall_table(standings: Mapping[str, Standing]) -> Table:
+    def interval(it: Interval) -> str:
+        low, _, high = _times(it)
+        return f"{low:.2f} to {high:.2f}" if it.size > 1 else "–"
+
+    return Table(
+        "Times the least delay, geometric mean over the cells without errors and humans",
+        ("controller", "rank", "times the least", "95 % interval"),
+        tuple(
+            (_label(name), it.words, f"{math.exp(it.mean.mean):.2f}", interval(it.mean))
+            for name, it in standings.items()
+        ),
+        notes=(
+            "In brackets the ranks that are possible: paired t-tests on common arrivals, with "
+            "Holm's correction, 95 % confidence for all ranks together.",
+        ),
+    )  # fmt: skip
+
+
+def _rank_table(result: Result) -> Table:
+    known = by_cell(result.rows)
+    standings = {
+        cell: ranked({name: it for name, it in known.get(cell, {}).items() if name != SCHEDULE})
+        for cell in result.head["cells"]
+    }
+    order = [name for name in names(result) if name != SCHEDULE]
+
+    def shown(cell: str, name: str) -> str:
+        it = standings[cell].get(name)
+        return f"{it.mean.mean:.1f}, {it.words}" if it else "×"
+
+    return Table(
+        "Mean delay [s] and rank in each cell, with the ranks that are possible",
+        ("controller", *standings),
+        tuple((_label(name), *(shown(cell, name) for cell in standings)) for name in order),
+        notes=(f"Ranked by {METRICS.get(RANKED, RANKED)}; least is best.",),
+    )
+
+
+def _trouble_table(result: Result) -> Table:
+    rows = tuple(
+        (cell, _label(name), why)
+        for cell, name, runs in groups(result.rows)
+        if (why := trouble(runs))
+    )
+    return Table("Not counted", ("cell", "controller", "why"), rows, labels=3)
