@@ -32,6 +32,7 @@ from scenarios.benchmark.ranking import (
 )
 from scenarios.benchmark.results import FILE, Result, save
 from scenarios.controllers import label_of
+from scenarios.optimum import ABOVE
 from scenarios.statistics import Interval, mean_interval
 
 #: Measures at a glance: column -> heading. For all of them, less is better.
@@ -120,14 +121,13 @@ def overall_figure(result: Result) -> Figure:
 def cells_figure(result: Result) -> Figure:
     """Percent above the least delay: controllers by cells."""
     order, cells = names(result), list(result.head["cells"])
-    known, by = by_cell(result.rows), result.rows.groupby("cell")
-    least = {str(cell): _mean(rows[LEAST]) for cell, rows in by}
+    known = by_cell(result.rows, ABOVE.name)
+    least = {str(cell): _mean(rows[LEAST]) for cell, rows in result.rows.groupby("cell")}
     values = np.full((len(order), len(cells)), np.nan)
     for i, name in enumerate(order):
         for j, cell in enumerate(cells):
-            delay = known.get(cell, {}).get(name)
-            if delay and least[cell] > 0.0:
-                values[i, j] = 100.0 * (np.mean([*delay.values()]) / least[cell] - 1.0)
+            if above := known.get(cell, {}).get(name):
+                values[i, j] = np.mean([*above.values()])
     heads = [
         f"{_wrapped(cell)}\n({least[cell]:.1f} s)" if least[cell] > 0.0 else _wrapped(cell)
         for cell in cells

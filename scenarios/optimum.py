@@ -106,7 +106,7 @@ class Optimum:
         plan = drivable(self.site, BUFFER, self.depart_speed)
         came, lane = self.arrivals.time, self.arrivals.lane
         queue = _queue(came, lane, self._kind, plan, self.site.dt)
-        return scheduled(queue, plan.rules, exact=False)
+        return scheduled(queue, plan.rules, bounded=False)
 
 
 def optimum(scenario: ScenarioLike, seed: int = 0) -> Optimum:
