@@ -13,7 +13,6 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from figures import plots, style
-from figures.gallery import write
 from figures.tables import Table
 from minisim.errors import plural
 from minisim.files import make_folder, write_table, write_text
@@ -63,13 +62,13 @@ def write_page(
     pictures = make_folder(folder / "figures")
     save(result, folder / FILE)
     write_table(means(result), folder / "cells.csv")
-    drawings = {
-        "overall": overall_figure, "cells": cells_figure, "measures": measures_figure,
-    }  # fmt: skip
+    drawings = {"cells": cells_figure}
+    if scores(result.rows, result.plain):
+        drawings = {"overall": overall_figure, **drawings, "measures": measures_figure}
     for done, (name, draw) in enumerate(drawings.items(), start=1):
-        write(draw(result), pictures, name)
+        style.save(draw(result), pictures / f"{name}.png")
         progress(done, len(drawings))
-    text = "\n\n".join(_report(result, facts))
+    text = "\n\n".join(_report(result, facts, drawings))
     write_text(folder / "report.md", text.rstrip() + "\n")
 
 
@@ -86,7 +85,7 @@ def overall_figure(result: Result) -> Figure:
     lines = {name: (it.mean, it.words) for name, it in standings.items()}
     if known := scores(result.rows, result.plain).get(SCHEDULE):
         lines[SCHEDULE] = mean_interval(known.values()), "no rival"
-    left, high = _margin(lines), 1.9 + 0.3 * max(len(lines), 1)
+    left, high = _margin(lines), 1.9 + 0.3 * len(lines)
     width = left + 6.6
     figure = style.new_figure(width, high)
     axes = figure.add_axes((left / width, 0.9 / high, 5.4 / width, 1.0 - 1.55 / high))
@@ -260,7 +259,7 @@ def _extent(result: Result) -> str:
     return f"{warning}{plural(len(result.head['seeds']), 'seed')}."
 
 
-def _report(result: Result, facts: str) -> Iterator[str]:
+def _report(result: Result, facts: str, drawn: Iterable[str]) -> Iterator[str]:
     head, standings = result.head, overall(result.rows, result.plain)
     yield f"# {_title(result, 'results')}"
     if head["quick"]:
@@ -276,7 +275,7 @@ def _report(result: Result, facts: str) -> Iterator[str]:
         "(docs/optimum.md); the schedule knows all arrivals beforehand. "
         f"`{FILE}` has every row: compare it with another one by `minisim benchmark --compare`."
     )
-    for name in ("overall", "cells", "measures"):
+    for name in drawn:
         yield f"![{name}](figures/{name}.png)"
     yield _overall_table(standings).markdown()
     yield _rank_table(result).markdown()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pandas as pd
 from matplotlib.figure import Figure
 
 from figures import plots, style
@@ -42,34 +43,32 @@ def optimum_figure(results: Results) -> Figure:
 
 def optimum_table(results: Results) -> Table:
     """The same in numbers, and the least delays themselves."""
-    good = results.good
-    places = [(arms, density) for arms in (3, 4, 5) for density in DENSITIES]
-
-    def shown(series: str | None, place: tuple[int, float], column: str) -> str:
-        rows = good[(good["arms"] == place[0]) & (good["density"] == place[1])]
-        if series is None:
-            rows = rows.drop_duplicates("seed")
-        else:
-            rows = rows[rows["series"] == series]
-        values = rows[column].dropna().astype(float).tolist()
-        if not values:
-            return "–"
-        it = mean_interval(values)
-        return f"{it.mean:.2f}" if series is None else f"{it.mean:.0f} ± {it.half_width:.0f}"
-
-    least = tuple(shown(None, place, LEAST.name) for place in places)
+    rows = []
+    for arms in (3, 4, 5):
+        good = results.good[results.good["arms"] == arms]
+        once = good.drop_duplicates(["density", "seed"])
+        rows.append((f"{arms}", "least delay [s]", *_cells(once, LEAST.name, 2)))
+        for name in SERIES:
+            chosen = good[good["series"] == name]
+            rows.append((f"{arms}", label_of(name), *_cells(chosen, ABOVE.name, 0)))
     return Table(
         "Mean delay above the least possible [%], with 95 % intervals",
-        ("arms, veh/h/lane", *(f"{arms}, {density:g}" for arms, density in places)),
-        (
-            ("least delay [s]", *least),
-            *(
-                (label_of(series), *(shown(series, place, ABOVE.name) for place in places))
-                for series in SERIES
-            ),
-        ),
+        ("arms", "controller", *(f"{density:g} veh/h/lane" for density in DENSITIES)),
+        tuple(rows), labels=2,
         notes=(f"{missing_note(results)}  Vehicles come for half of that time.",),
-    )
+    )  # fmt: skip
+
+
+def _cells(rows: pd.DataFrame, column: str, digits: int) -> list[str]:
+    """Mean and interval at each demand."""
+    values = [
+        rows[column][rows["density"] == density].dropna().astype(float).tolist()
+        for density in DENSITIES
+    ]
+    means = [mean_interval(each) if each else None for each in values]
+    return [
+        "–" if it is None else f"{it.mean:.{digits}f} ± {it.half_width:.{digits}f}" for it in means
+    ]
 
 
 SECTION = Section(

@@ -110,8 +110,7 @@ def test_the_bound_holds_with_few_states_too(monkeypatch: pytest.MonkeyPatch, mo
     assert 0 < looser < 100
     monkeypatch.setattr(sequencing, "LARGEST", 2)
     with pytest.raises(InputError, match="would take too long: more than 2 states at once"):
-        for case in cases:
-            scheduled(*case)
+        list(map(scheduled, *zip(*cases, strict=True)))
 
 
 def test_without_vehicles_there_is_nothing_to_order() -> None:

@@ -48,6 +48,7 @@ SAID = [
         'humans = [0, 0.25]\nseeds = [1]\ncontroller = "dim:gate=harmonious"\n',
         [Recipe(four_way(), HARMONIOUS, 1), Recipe(four_way(), HARMONIOUS, 1, 0.25)],
     ),
+    ("seeds = [1]\ndemand_time = 60", [Recipe(four_way(demand_time=60.0), Dim(), 1)]),
     ('seeds = [1]\nsplit = "(4,3,2,1)"', [Recipe(four_way(split=(4, 3, 2, 1)), Dim(), 1)]),
     (
         "seeds = [1]\nsplit = [4, 3, 2, 1]\nturns = [1, 2, 1]",
