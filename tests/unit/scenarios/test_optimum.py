@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from baselines import Reservation
+from baselines import AllWayStop, Reservation
 from minisim.arrivals import Arrivals
 from minisim.control import Unregulated
 from minisim.errors import InputError
@@ -82,7 +82,8 @@ def test_runs_that_leave_vehicles_behind_have_no_distance_from_the_least_delay()
 
 
 def test_vehicles_without_a_bound_have_no_least_delay() -> None:
-    told = simulate(four_way(profile=AS_RUN, horizon=20.0), Unregulated()).summary([LEAST])
+    unlike = replace(FAIR, vehicle=VehicleType(speed_deviation=0.1))
+    told = simulate(four_way(50.0, profile=unlike, horizon=20.0), AllWayStop()).summary([LEAST])
     assert told["least_delay_s"] is None
 
 

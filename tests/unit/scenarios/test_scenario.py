@@ -130,7 +130,8 @@ def test_recorded_arrivals_and_a_day_stop_at_the_demand_time_too() -> None:
     made = Scenario(**{**BASE, "horizon": 100.0, "demand_time": 20.0, "recorded": recorded})
     assert len(made.arrivals(0)) == 1
     assert made.rates == (180.0, 0.0, 0.0, 0.0)
-    day = DemandProfile((Period("07:00", "07:01", (360.0, 0.0, 0.0, 0.0)),))
+    minute = Period(start="07:00", end="07:01", rates=(360.0, 0.0, 0.0, 0.0))
+    day = DemandProfile(periods=(minute,))
     made = Scenario(**{**BASE, "horizon": 100.0, "demand_time": 60.0, "demand": day})
     assert made.rates == (360.0, 0.0, 0.0, 0.0)
     with pytest.raises(InputError, match="ends 60 s after its start, before the run of 70 s"):
