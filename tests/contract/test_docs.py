@@ -12,7 +12,7 @@ import pytest
 from minisim.counts import read_counts
 from tests import ROOT
 
-PAGES = ("README.md", *(f"docs/{name}.md" for name in ("counts", "pcu", "safety")))
+PAGES = ("README.md", *(f"docs/{name}.md" for name in ("benchmark", "counts", "pcu", "safety")))
 
 
 def blocks(page: str, kind: str = "python") -> list[str]:
