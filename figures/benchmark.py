@@ -275,6 +275,8 @@ def _report(result: Result, facts: str, drawn: Iterable[str]) -> Iterator[str]:
         "(docs/optimum.md); the schedule knows all arrivals beforehand. "
         f"`{FILE}` has every row: compare it with another one by `minisim benchmark --compare`."
     )
+    for cell, why in head["no_least"].items():
+        yield f"The least delay of the cell {cell} is not known: {why}."
     for name in drawn:
         yield f"![{name}](figures/{name}.png)"
     yield _overall_table(standings).markdown()

@@ -17,7 +17,8 @@ from minisim.files import AnyPath, read_file, write_text
 from minisim.results.metric import BEGINNINGS
 from minisim.version import __version__
 from scenarios.benchmark.definition import Benchmark
-from scenarios.benchmark.ranking import RANKED, chance
+from scenarios.benchmark.ranking import LEAST, RANKED, chance
+from scenarios.optimum import optimum
 from scenarios.statistics import Interval, mean_interval
 from scenarios.sweep.keys import RESULTS
 from scenarios.sweep.rows import Row
@@ -79,11 +80,26 @@ def measured(
         "benchmark": benchmark.name, "benchmark_version": benchmark.version,
         "digest": benchmark.digest, "quick": benchmark.quick, "seeds": list(benchmark.seeds),
         "cells": [cell.name for cell in benchmark.cells], "plain": list(benchmark.plain),
+        "no_least": _without_least(benchmark, frame),
         "controllers": [name for name, _ in controllers],
         "minisim": __version__, "results": RESULTS, "commit": commit(),
     }  # fmt: skip
     columns = [*KEY, "error", *(c for c in frame if c not in (*KEY, "error"))]
     return Result(head, frame.reindex(columns=columns))
+
+
+def _without_least(benchmark: Benchmark, rows: pd.DataFrame) -> dict[str, str]:
+    """Cells of which no seed has a known least delay, and why."""
+    reasons = {}
+    for cell in benchmark.cells:
+        here = rows[rows["cell"] == cell.name]
+        if LEAST not in here or here[LEAST].isna().all():
+            try:
+                _ = optimum(cell.scenario, benchmark.seeds[0]).bound
+                reasons[cell.name] = "no run went well"
+            except InputError as error:
+                reasons[cell.name] = str(error)
+    return reasons
 
 
 def commit() -> str | None:
@@ -129,7 +145,7 @@ def load(path: AnyPath) -> Result:
 
 #: What the head of a result must have.
 HEAD = {"benchmark", "benchmark_version", "digest", "quick", "seeds", "cells", "plain",
-        "controllers", "minisim", "results", "commit"}  # fmt: skip
+        "no_least", "controllers", "minisim", "results", "commit"}  # fmt: skip
 
 
 class Change(NamedTuple):

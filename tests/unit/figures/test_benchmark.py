@@ -38,6 +38,7 @@ def result() -> Result:
     head = {
         "benchmark": "ours", "benchmark_version": 3, "digest": "abc", "quick": False,
         "seeds": [1, 2, 3], "cells": [*CELLS], "plain": ["calm", "busy"],
+        "no_least": {},
         "controllers": ["dim", "reservation", "mine"], "minisim": "1", "results": 1,
         "commit": None,
     }  # fmt: skip

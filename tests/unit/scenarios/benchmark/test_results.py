@@ -6,6 +6,7 @@ import pandas as pd
 import pytest
 
 from minisim.errors import FileError, InputError
+from scenarios import optimum
 from scenarios.benchmark.definition import SCHEDULE, entrants, read_benchmark
 from scenarios.benchmark.ranking import overall, trouble
 from scenarios.benchmark.results import FILE, Result, compare, load, measured, save
@@ -71,6 +72,23 @@ def test_no_controller_is_below_the_least_delay_and_all_are_ranked(result: Resul
         (100.0 * (good["delay_s"] / good["least_delay_s"] - 1.0)).tolist()
     )
     assert set(overall(result.rows, result.plain)) == {"dim", "all-way-stop", "reservation"}
+
+
+def test_where_the_least_delay_is_not_known_it_says_why(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object) -> float:
+        raise InputError("more than 0 states at once")
+
+    monkeypatch.setattr(optimum, "_bound", refuse)
+    file = tmp_path / "small.toml"
+    file.write_text(SMALL.replace("seeds = 2", "seeds = [5]"))
+    with Store(tmp_path / "s.sqlite") as store:
+        made = measured(read_benchmark(file), entrants(["dim"]), store, 1, lambda *_: None)
+    assert [*made.head["no_least"]] == ["plain", "humans"]
+    assert set(made.head["no_least"].values()) == {"more than 0 states at once"}
+    assert made.rows["delay_s"].notna().all()
+    assert overall(made.rows, made.plain) == {}
 
 
 def test_a_file_holds_the_whole_result(result: Result, tmp_path: Path) -> None:
