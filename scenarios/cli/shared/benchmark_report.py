@@ -29,9 +29,8 @@ def benchmark_table(result: Result) -> Table:
         if name not in standings:
             rows = result.rows[result.rows["controller"] == name]
             lost = [cell for cell, runs in rows.groupby("cell", sort=False) if trouble(runs)]
-            table.add_row(
-                name, "–", f"not served: {', '.join(map(str, lost))}" if lost else "–", ""
-            )
+            why = f"not served: {', '.join(map(str, lost))}" if lost else "–"
+            table.add_row(name, "–", why, "")
     return table
 
 
