@@ -1,35 +1,27 @@
-"""The page of a benchmark: who is how good, where, and by which measure."""
+"""The figures of a benchmark: how good each controller is, where, and by which measure."""
 
 from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from pathlib import Path
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from figures import plots, style
-from figures.tables import Table
 from minisim.errors import plural
-from minisim.files import make_folder, write_table, write_text
-from minisim.results.metrics import METRICS
-from scenarios.benchmark.definition import MEASURED, SCHEDULE
+from scenarios.benchmark.definition import SCHEDULE
 from scenarios.benchmark.ranking import (
     LEAST,
-    RANKED,
-    Standing,
     by_cell,
-    groups,
     overall,
-    ranked,
     scores,
-    trouble,
 )
-from scenarios.benchmark.results import FILE, Result, save
+from scenarios.benchmark.results import Result
 from scenarios.controllers import label_of
 from scenarios.optimum import ABOVE
 from scenarios.statistics import Interval, mean_interval
@@ -55,23 +47,6 @@ SCALE = "YlGnBu"
 ALIKE = 0.005
 
 
-def write_page(
-    result: Result, folder: Path, facts: str, progress: Callable[[int, int], None]
-) -> None:
-    """Write benchmark.json, report.md, cells.csv and the figures into a folder; `FileError`."""
-    pictures = make_folder(folder / "figures")
-    save(result, folder / FILE)
-    write_table(means(result), folder / "cells.csv")
-    drawings = {"cells": cells_figure}
-    if scores(result.rows, result.plain):
-        drawings = {"overall": overall_figure, **drawings, "measures": measures_figure}
-    for done, (name, draw) in enumerate(drawings.items(), start=1):
-        style.save(draw(result), pictures / f"{name}.png")
-        progress(done, len(drawings))
-    text = "\n\n".join(_report(result, facts, drawings))
-    write_text(folder / "report.md", text.rstrip() + "\n")
-
-
 def names(result: Result) -> list[str]:
     """All controllers, the best first; those without an overall rank, and the schedule, last."""
     standings = overall(result.rows, result.plain)
@@ -91,12 +66,26 @@ def overall_figure(result: Result) -> Figure:
     axes = figure.add_axes((left / width, 0.9 / high, 5.4 / width, 1.0 - 1.55 / high))
     for place, (name, (mean, words)) in enumerate(lines.items()):
         look = style.look(name)
-        low, value, top = _times(mean)
+        low, value, top = times(mean)
         axes.errorbar(value, place, xerr=[[value - low], [top - value]], color=look.colour,
                       marker=look.marker, markersize=6.5, capsize=2.6, elinewidth=1.2)  # fmt: skip
         axes.annotate(words, (1.02, place), xycoords=("axes fraction", "data"), va="center",
                       fontsize=9.0, color=style.INK)  # fmt: skip
     style.plot_axes(axes, "", "times the least delay that is possible, logarithmic", "")
+    _times_axis(axes)
+    axes.set_yticks(range(len(lines)), list(map(label, lines)))
+    axes.set_ylim(len(lines) - 0.5, -0.5)
+    style.write(figure, (left + 5.5) / width, 1.0 - 0.5 / high, "rank", 9.5, bold=True)
+    note = (
+        f"{_extent(result)}  Geometric mean over {plural(len(result.plain), 'cell')} without "
+        "errors and humans; 95 % intervals over seeds. In brackets the ranks that are possible, "
+        "with 95 % confidence for all together."
+    )
+    _framed(figure, titled(result, "overall"), note)
+    return figure
+
+
+def _times_axis(axes: Axes) -> None:
     axes.set_xscale("log")
     axes.set_xlim(1.0, max(axes.get_xlim()[1], 2.0))
     ticks = [1, 1.5, 2, 3, 5, 7, 10, 15, 20, 30, 50, 100]
@@ -105,16 +94,6 @@ def overall_figure(result: Result) -> Figure:
     axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.grid(axis="x", color=style.FAINT, linewidth=0.8)
     axes.grid(axis="y", visible=False)
-    axes.set_yticks(range(len(lines)), [_label(name) for name in lines])
-    axes.set_ylim(len(lines) - 0.5, -0.5)
-    style.write(figure, (left + 5.5) / width, 1.0 - 0.5 / high, "rank", 9.5, bold=True)
-    note = (
-        f"{_extent(result)}  Geometric mean over {plural(len(result.plain), 'cell')} without "
-        "errors and humans; 95 % intervals over seeds. In brackets the ranks that are possible, "
-        "with 95 % confidence for all together."
-    )
-    _framed(figure, _title(result, "overall"), note)
-    return figure
 
 
 def cells_figure(result: Result) -> Figure:
@@ -136,14 +115,14 @@ def cells_figure(result: Result) -> Figure:
         f"{_extent(result)}  In brackets the least mean delay that is possible.  ×: collided, "
         "refused or left vehicles behind; the report says which."
     )
-    title = _title(result, "mean delay above the least possible [%]")
+    title = titled(result, "mean delay above the least possible [%]")
     return _heat(order, heads, values, shades, title, note)
 
 
 def measures_figure(result: Result) -> Figure:
     """Some measures by controller: means over the plain cells, coloured by their order."""
     order = [name for name in names(result) if name in scores(result.rows, result.plain)]
-    plain = _per_trip(result.rows[result.rows["cell"].isin(result.plain)])
+    plain = per_trip(result.rows[result.rows["cell"].isin(result.plain)])
     columns = [column for column in GLANCE if column in plain]
     values = np.array([
         [_mean(plain[plain["controller"] == name][column]) for column in columns] for name in order
@@ -156,7 +135,7 @@ def measures_figure(result: Result) -> Figure:
     )
     heads = [GLANCE[column] for column in columns]
     shades = better / max(len(order) - 1, 1)
-    return _heat(order, heads, values, shades, _title(result, "measures"), note)
+    return _heat(order, heads, values, shades, titled(result, "measures"), note)
 
 
 def _heat(
@@ -174,7 +153,7 @@ def _heat(
                   color=style.PAPER if shades[i, j] > 0.5 else style.INK)  # fmt: skip
     axes.set_xticks(range(len(heads)), heads, fontsize=8.0)
     axes.xaxis.tick_top()
-    axes.set_yticks(range(len(order)), [_label(name) for name in order], fontsize=9.0)
+    axes.set_yticks(range(len(order)), [label(name) for name in order], fontsize=9.0)
     axes.set_xticks(np.arange(len(heads) - 1) + 0.5, minor=True)
     axes.set_yticks(np.arange(len(order) - 1) + 0.5, minor=True)
     axes.tick_params(which="both", length=0, labelcolor=style.INK)
@@ -190,7 +169,7 @@ def _framed(figure: Figure, title: str, note: str) -> None:
     style.write(figure, plots.LEFT, top, title, 13, bold=True)
 
 
-def _times(mean: Interval) -> tuple[float, float, float]:
+def times(mean: Interval) -> tuple[float, float, float]:
     """Low end, value and high end of an interval of logarithms."""
     half = 0.0 if math.isnan(mean.half_width) else mean.half_width
     low, value, high = (math.exp(mean.mean + sign * half) for sign in (-1.0, 0.0, 1.0))
@@ -209,25 +188,7 @@ def _shown(value: float) -> str:
     return f"{value:.2g}" if value < 10.0 else f"{value:.0f}"
 
 
-def means(result: Result) -> pd.DataFrame:
-    """Mean and half width of the 95 % interval of every measure, by cell and controller."""
-    columns = [it if isinstance(it, str) else it.name for it in MEASURED]
-    rows = _per_trip(result.rows)
-    known = map(str, rows.columns)
-    wanted = [c for c in known if c.removeprefix("complete_").startswith(tuple(columns))]
-    made = []
-    for cell, name, runs in groups(rows):
-        line: dict[str, Any] = {"cell": cell, "controller": name, "trouble": trouble(runs)}
-        for column in wanted:
-            values = pd.to_numeric(runs[column], errors="coerce").dropna().tolist()
-            if values:
-                interval = mean_interval(values)
-                line |= {column: interval.mean, f"{column}_ci95": interval.half_width}
-        made.append(line)
-    return pd.DataFrame(made)
-
-
-def _per_trip(rows: pd.DataFrame) -> pd.DataFrame:
+def per_trip(rows: pd.DataFrame) -> pd.DataFrame:
     """Rows in which measures of exchange are per trip."""
     trips = pd.to_numeric(rows["trips"], errors="coerce") if "trips" in rows else math.nan
     there = [column for column in PER_TRIP if column in rows]
@@ -240,16 +201,18 @@ def _mean(values: pd.Series[Any]) -> float:
     return float(pd.to_numeric(values, errors="coerce").mean())
 
 
-def _label(name: str) -> str:
+def label(name: str) -> str:
+    """What figures and tables call a controller."""
     return "schedule (knows all arrivals)" if name == SCHEDULE else label_of(name)
 
 
 def _margin(order: Iterable[str]) -> float:
     """Room for the labels [in]."""
-    return 0.4 + 0.072 * max(map(len, map(_label, order)), default=0)
+    return 0.4 + 0.072 * max(map(len, map(label, order)), default=0)
 
 
-def _title(result: Result, what: str) -> str:
+def titled(result: Result, what: str) -> str:
+    """A heading with the benchmark's name and version."""
     head = result.head
     return f"Benchmark {head['benchmark']} {head['benchmark_version']}: {what}"
 
@@ -257,76 +220,3 @@ def _title(result: Result, what: str) -> str:
 def _extent(result: Result) -> str:
     warning = "A smoke test: its numbers mean nothing.  " if result.head["quick"] else ""
     return f"{warning}{plural(len(result.head['seeds']), 'seed')}."
-
-
-def _report(result: Result, facts: str, drawn: Iterable[str]) -> Iterator[str]:
-    head, standings = result.head, overall(result.rows, result.plain)
-    yield f"# {_title(result, 'results')}"
-    if head["quick"]:
-        yield "**A smoke test: few and short runs. Its numbers mean nothing.**"
-    yield (
-        f"minisim {head['minisim']}, results {head['results']}, commit "
-        f"{head['commit'] or 'unknown'}; definition {head['digest']}; seeds "
-        f"{', '.join(map(str, head['seeds']))}. {facts}"
-    )
-    yield (
-        "All controllers have the same arrivals. A run goes on until its last vehicle has arrived, "
-        "and every vehicle counts. The least delay is a bound that no controller can beat "
-        "(docs/optimum.md); the schedule knows all arrivals beforehand. "
-        f"`{FILE}` has every row: compare it with another one by `minisim benchmark --compare`."
-    )
-    for cell, why in head["no_least"].items():
-        yield f"The least delay of the cell {cell} is not known: {why}."
-    for name in drawn:
-        yield f"![{name}](figures/{name}.png)"
-    yield _overall_table(standings).markdown()
-    yield _rank_table(result).markdown()
-    yield _trouble_table(result).markdown()
-
-
-def _overall_table(standings: Mapping[str, Standing]) -> Table:
-    def interval(it: Interval) -> str:
-        low, _, high = _times(it)
-        return f"{low:.2f} to {high:.2f}" if it.size > 1 else "–"
-
-    return Table(
-        "Times the least delay, geometric mean over the cells without errors and humans",
-        ("controller", "rank", "times the least", "95 % interval"),
-        tuple(
-            (_label(name), it.words, f"{math.exp(it.mean.mean):.2f}", interval(it.mean))
-            for name, it in standings.items()
-        ),
-        notes=(
-            "In brackets the ranks that are possible: paired t-tests on common arrivals, with "
-            "Holm's correction, 95 % confidence for all ranks together.",
-        ),
-    )  # fmt: skip
-
-
-def _rank_table(result: Result) -> Table:
-    known = by_cell(result.rows)
-    standings = {
-        cell: ranked({name: it for name, it in known.get(cell, {}).items() if name != SCHEDULE})
-        for cell in result.head["cells"]
-    }
-    order = [name for name in names(result) if name != SCHEDULE]
-
-    def shown(cell: str, name: str) -> str:
-        it = standings[cell].get(name)
-        return f"{it.mean.mean:.1f}, {it.words}" if it else "×"
-
-    return Table(
-        "Mean delay [s] and rank in each cell, with the ranks that are possible",
-        ("controller", *standings),
-        tuple((_label(name), *(shown(cell, name) for cell in standings)) for name in order),
-        notes=(f"Ranked by {METRICS.get(RANKED, RANKED)}; least is best.",),
-    )
-
-
-def _trouble_table(result: Result) -> Table:
-    rows = tuple(
-        (cell, _label(name), why)
-        for cell, name, runs in groups(result.rows)
-        if (why := trouble(runs))
-    )
-    return Table("Not counted", ("cell", "controller", "why"), rows, labels=3)

@@ -28,7 +28,7 @@ def optimum_figure(results: Results) -> Figure:
         chosen = rows[rows["arms"] == arms]
         plots.draw_means(axes, chosen, ABOVE.name, SERIES)
         style.plot_axes(axes, f"{arms} arms", plots.DENSITY_LABEL, "")
-        plots.log_time(axes, 5.0, 20_000.0)
+        plots.log_time(axes, 5.0, 40_000.0)
         plots.density_axis(axes, rows["density"])
     panels[0].set_ylabel("mean delay above the least possible [%], logarithmic", **style.LABEL)
     note = (

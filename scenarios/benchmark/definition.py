@@ -9,18 +9,19 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass, replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
 from dim import Dim, ExactPerception
 from minisim.control import Controller
-from minisim.errors import InputError, instance, integer
+from minisim.errors import InputError, choice, instance, integer
 from minisim.names import name_of
 from minisim.results.metric import Metric
 from minisim.results.metrics import METRICS
 from scenarios.controllers import SAFE, controller_named, plugins
+from scenarios.defaults import AXES, SINGLE
 from scenarios.optimum import ABOVE, DELAY, LEAST, Clairvoyant
 from scenarios.recipe import Recipe
 from scenarios.scenario import Scenario
@@ -61,11 +62,12 @@ class Cell:
         humans = self.humans if isinstance(controller, Dim) else 0.0
         if self.humans and getattr(controller, "radio", None) is not None:
             raise InputError("needs messages from every vehicle, and humans send none")
-        if self.perception != ExactPerception() and hasattr(controller, "perception"):
-            errs: Any = replace(controller, perception=self.perception)  # type: ignore[type-var]
-            controller = errs
+        given: Any = controller
+        perceives = is_dataclass(given) and "perception" in {it.name for it in fields(given)}
+        if perceives and self.perception != ExactPerception():
+            given = replace(given, perception=self.perception)
         return Recipe(
-            self.scenario, controller, seed, humans, label=name, on_collision="record",
+            self.scenario, given, seed, humans, label=name, on_collision="record",
             metrics=MEASURED,
         )  # fmt: skip
 
@@ -124,6 +126,8 @@ def read_benchmark(path: str | os.PathLike[str] | None = None, *, quick: bool = 
             raise InputError('the benchmark has no name; it is written name = "…"')
         version = integer("version of the benchmark", version, low=1)
         instance("[quick]", shorter, dict)
+        for key in shorter:
+            choice("key of [quick]", key, (*AXES, *SINGLE))
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
     recipes = experiments_of(table, path, shorter if quick else {})

@@ -59,7 +59,7 @@ def benchmark(
             raise InputError(f"--compare runs nothing, so {' and '.join(clash)} cannot be given")
         _compare(*compare)
         return
-    from figures.benchmark import write_page
+    from figures.benchmark_report import write_page
     from minisim.files import make_folder
     from scenarios.benchmark.definition import entrants, read_benchmark
     from scenarios.benchmark.results import FILE, measured

@@ -52,5 +52,4 @@ STUDY = Study(
         DrainedPoint(name, arms, density)
         for arms, name, density in product((3, 4, 5), (SCHEDULE, *RIVALS), DENSITIES)
     ),
-    few={SCHEDULE: 5},
 )

@@ -5,14 +5,8 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from figures.benchmark import (
-    cells_figure,
-    means,
-    measures_figure,
-    names,
-    overall_figure,
-    write_page,
-)
+from figures.benchmark import cells_figure, measures_figure, names, overall_figure
+from figures.benchmark_report import means, write_page
 from scenarios.benchmark.results import FILE, Result, load
 
 CELLS = {"calm": 1.0, "busy": 2.0, "40 % humans": 1.5}

@@ -91,6 +91,7 @@ def test_all_runs_of_a_seed_have_the_same_arrivals() -> None:
         ("version = 1\n", "the benchmark has no name"),
         ('name = "x"\nversion = 0\n', "version of the benchmark must be an integer"),
         ('name = "x"\nversion = 1\nquick = 3\n', r"\[quick\] must be a dict, got 3"),
+        (HEAD + "[quick]\nsedes = 3\n", r"unknown key of \[quick\] 'sedes'.*mean 'seeds'"),
         (HEAD + "sedes = 3\n", "unknown key 'sedes'.*did you mean 'seeds'"),
         (HEAD + 'controller = "dimm"\n', "did you mean 'dim'"),
         (HEAD + "density = [50, 100]\n", "two cells are called 'four-way'"),
@@ -110,7 +111,7 @@ def test_quick_replaces_keys_of_every_block(tmp_path: Path) -> None:
 
 
 def test_all_that_promise_no_collision_take_part_or_those_that_are_named(tmp_path: Path) -> None:
-    mine = tmp_path / "mine.py"
+    mine = tmp_path / "benchmark_entrant.py"
     mine.write_text("from baselines import AllWayStop\n\nclass Mine(AllWayStop):\n    name = 'm'\n")
     everyone = [name for name, _ in entrants()]
     assert set(everyone) >= {*SAFE}

@@ -15,7 +15,7 @@ from tests.unit.scenarios.cli.test_cli import Captured, fails, ok
 
 
 def test_it_measures_ranks_and_continues(tmp_path: Path, capsys: Captured) -> None:
-    file, mine, out = tmp_path / "small.toml", tmp_path / "mine.py", tmp_path / "out"
+    file, mine, out = tmp_path / "small.toml", tmp_path / "benchmark_rival.py", tmp_path / "out"
     file.write_text(SMALL)
     mine.write_text("from baselines import AllWayStop\n\nclass Mine(AllWayStop):\n    name = 'm'\n")
     asked = ["benchmark", str(file), "-c", "reservation", "--add", f"{mine}:Mine", "--jobs", "1"]

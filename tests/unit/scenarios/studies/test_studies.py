@@ -123,4 +123,4 @@ def test_the_optimum_study_has_a_schedule_beside_the_rivals_and_time_for_every_v
         recipe = point.recipe(2, 1000.0)
         assert recipe.name == point.series
         assert (recipe.scenario.until, recipe.scenario.horizon) == (500.0, 2100.0)
-    assert len(study.runs(10)) == 12 * (5 + 10 * len(RIVALS))
+    assert len(study.runs(10)) == 12 * 10 * (1 + len(RIVALS))
