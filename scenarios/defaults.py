@@ -27,7 +27,7 @@ AXES: dict[str, Any] = {
 
 #: Key with one value for a block -> its default.
 SINGLE: dict[str, Any] = {
-    "horizon": None, "warmup": 0.0, "min_headway": 1.5, "on_collision": "stop",
+    "horizon": None, "demand_time": None, "warmup": 0.0, "min_headway": 1.5, "on_collision": "stop",
     "metrics": (), "start": None,
 }  # fmt: skip
 

@@ -62,6 +62,7 @@ class Options(TypedDict, total=False):
     unit: str
     fleet: Fleet | VehicleType | Mapping[str, float | Sequence[float]] | str | None
     horizon: float
+    demand_time: float | None
     warmup: float
     recorded: Arrivals | None
     demand: DemandProfile

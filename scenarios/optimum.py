@@ -2,30 +2,36 @@
 
 Delay counts against driving on at the limits of the roads: arrival − demand − the time that the way
 takes at the limits. Without markings of a controller, that is its `control_delay_s`, up to a step
-per trip. Every vehicle counts, so runs go on until the last one has arrived.
+per trip. Every vehicle counts, so runs go on until the last one has arrived (`drained`).
+
+The metrics at the end go wherever metrics do: `--metrics scenarios.optimum:ABOVE`.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 
+from baselines.optimum.alone import drives
 from baselines.optimum.planning import drivable
 from baselines.optimum.scheduled import BUFFER, Scheduled, Turn
-from baselines.optimum.separations import Needs, necessary
-from baselines.optimum.sequencing import WAKE_STEP, Queue, scheduled
+from baselines.optimum.separations import Needs, alike, necessary
+from baselines.optimum.sequencing import WAKE_STEP, Queue, Schedule, scheduled
 from baselines.prediction import Floats
 from minisim.arrivals import Arrivals, ranks
-from minisim.control import Controller, Cover, Site
+from minisim.control import Controller, Cover, Session, Site
 from minisim.engine.state import types_of
 from minisim.errors import CollisionError, InputError
 from minisim.junction.movements import Ints
 from minisim.names import name_of
-from minisim.results.run import Run
+from minisim.parameters import declared, part
+from minisim.results.metric import Metric
+from minisim.results.run import Run, ScenarioLike
 from minisim.simulation import simulate
 from scenarios.scenario import Scenario
 
@@ -36,40 +42,47 @@ COVERS = Cover(alike=True)
 PATIENCE = 3.0
 
 
-@dataclass(frozen=True)
-class Drained:
-    """A scenario whose runs go on until the last vehicle has arrived."""
-
-    scenario: Scenario
-    name: str = field(init=False)
-    profile_name: str = field(init=False)
-    density: float = field(init=False)
-    depart_speed: float | None = field(init=False)
-    horizon: float = field(init=False)
-    warmup: float = 0.0
-
-    def __post_init__(self) -> None:
-        for name in ("name", "profile_name", "density", "depart_speed"):
-            object.__setattr__(self, name, getattr(self.scenario, name))
-        object.__setattr__(self, "horizon", self.scenario.horizon * PATIENCE + 600.0)
-
-    def site(self, seed: int) -> Site:
-        """What a controller may know, the expected inflow of the demand included."""
-        return self.scenario.site(seed)
-
-    def arrivals(self, seed: int) -> Arrivals:
-        """Those of the scenario."""
-        return self.scenario.arrivals(seed)
+def drained(scenario: Scenario) -> Scenario:
+    """The scenario with time for its last vehicle to arrive."""
+    end = max(scenario.horizon, scenario.until * PATIENCE + 600.0)
+    return replace(scenario, demand_time=scenario.until, horizon=end)
 
 
-class Optimum(NamedTuple):
-    """The least delay of an arrival table, and a schedule; means over all vehicles."""
+@dataclass(frozen=True, eq=False)
+class Optimum:
+    """The least delay of an arrival table, and a schedule; means over all vehicles [s]."""
 
-    vehicles: int
-    bound: float  #: no controller has less [s]
-    planned: float  #: of the schedule [s]
-    schedule: Scheduled  #: a controller that keeps it
-    at_limit: float  #: what the ways take at the limits, from demand time 0 [s]
+    site: Site
+    depart_speed: float | None
+    arrivals: Arrivals
+
+    @property
+    def vehicles(self) -> int:
+        """How many there are."""
+        return len(self.arrivals)
+
+    @cached_property
+    def bound(self) -> float:
+        """No controller has less; `InputError` if there would be too many states."""
+        came, lane = self.arrivals.time.astype(float), self.arrivals.lane.astype(np.int64)
+        packed = (column.tobytes() for column in (came, lane, self._kind))
+        return _bound(alike(self.site), self.depart_speed, *packed)
+
+    @cached_property
+    def planned(self) -> float:
+        """Of the schedule, if vehicles could keep it."""
+        limit = _at_limit(self.site, self.depart_speed)[self._kind]
+        spent = self._best.arrival.sum() - (self.arrivals.time + limit).sum()
+        return float(spent) / max(self.vehicles, 1)
+
+    @cached_property
+    def schedule(self) -> Scheduled:
+        """A controller that keeps it."""
+        lane, best = self.arrivals.lane, self._best
+        order = np.lexsort((self.arrivals.time, lane))[best.order]
+        columns = (column[order].tolist() for column in (lane, ranks(lane), self._kind))
+        turns = zip(*columns, best.time[best.order].tolist(), strict=True)
+        return Scheduled(tuple(Turn(*turn) for turn in turns))
 
     @property
     def facts(self) -> dict[str, Any]:
@@ -80,36 +93,49 @@ class Optimum(NamedTuple):
         """By how much a mean delay [s] exceeds the bound [%]; None if the bound is 0."""
         return 100.0 * (delay - self.bound) / self.bound if self.bound > 0.0 else None
 
-    def delay(self, run: Run) -> float | None:
-        """The mean delay of a run [s]; None if a vehicle has not arrived."""
-        arrival = run.columns.arrival
-        if np.isnan(arrival).any():
-            return None
-        return float(arrival.mean()) - self.at_limit if len(arrival) else 0.0
+    @cached_property
+    def _kind(self) -> Ints:
+        """The movement of each vehicle, those of each type in turn, shape (k,)."""
+        movements = self.site.intersection.movements
+        movement = movements.index_of[self.arrivals.lane, self.arrivals.manoeuvre]
+        kind = types_of(self.site, self.arrivals) * len(movements) + movement
+        return np.asarray(kind, np.int64)
+
+    @cached_property
+    def _best(self) -> Schedule:
+        plan = drivable(self.site, BUFFER, self.depart_speed)
+        came, lane = self.arrivals.time, self.arrivals.lane
+        queue = _queue(came, lane, self._kind, plan, self.site.dt)
+        return scheduled(queue, plan.rules, bounded=False)
 
 
-def optimum(scenario: Scenario, seed: int = 0) -> Optimum:
-    """The bound and a schedule for the arrivals of a seed; raises `InputError` for `COVERS`."""
+def optimum(scenario: ScenarioLike, seed: int = 0) -> Optimum:
+    """That of the arrivals of a seed; raises `InputError` for vehicles that are not covered."""
     site, arrivals = scenario.site(seed), scenario.arrivals(seed)
-    _check(site, arrivals)
-    movement = site.intersection.movements.index_of[arrivals.lane, arrivals.manoeuvre]
-    kind = types_of(site, arrivals) * len(site.intersection.movements) + movement
-    count, order = len(kind), np.lexsort((arrivals.time, arrivals.lane))
-    enters = np.ceil(arrivals.time / site.dt - 1e-6) * site.dt
-    needs = necessary(site, scenario.depart_speed)
-    plan = drivable(site, BUFFER, scenario.depart_speed)
-    least = scheduled(_queue(enters[order], arrivals.lane[order], kind[order], needs), needs.rules)
-    own = _queue(enters[order], arrivals.lane[order], kind[order], plan)
-    best = scheduled(own, plan.rules, exact=False)
-    rank = ranks(arrivals.lane)[order]
-    turns = tuple(
-        Turn(int(arrivals.lane[order[i]]), int(rank[i]), int(kind[order[i]]), float(best.time[i]))
-        for i in best.order.tolist()
-    )
-    at_limit = float((arrivals.time + needs.at_limit[kind]).sum())
-    mean = 1.0 / max(count, 1)
-    bound, planned = max(least.bound - at_limit, 0.0), float(best.arrival.sum()) - at_limit
-    return Optimum(count, bound * mean, planned * mean, Scheduled(turns), at_limit * mean)
+    for it in site.types:
+        COVERS.check("the optimum", it)
+        if it.sumo is not None:
+            raise InputError(
+                f"the optimum is for vehicles with minisim's own rules, got sumo={it.sumo!r}"
+            )
+    factors = arrivals.speed_factor
+    if factors is not None and (factors != 1.0).any():
+        raise InputError("the optimum is for drivers that are alike, got speed factors")
+    return Optimum(site, scenario.depart_speed, arrivals)
+
+
+@declared
+class Clairvoyant:
+    """Knows the arrivals of its scenario beforehand, and keeps the schedule of the optimum."""
+
+    name = "schedule"
+    covers = COVERS
+
+    scenario: Scenario = part("whose arrivals it knows", Scenario)
+
+    def start(self, site: Site) -> Session:
+        """Begin a run; raises as `optimum`."""
+        return optimum(self.scenario, site.seed).schedule.start(site)
 
 
 def compared(
@@ -124,7 +150,7 @@ def compared(
         own = controller is least.schedule
         row: dict[str, Any] = {"controller": "schedule" if own else name_of(controller)}
         try:
-            delay = least.delay(host(Drained(scenario), controller, seed))
+            delay = mean_delay(host(drained(scenario), controller, seed))
             why = "a vehicle did not arrive" if delay is None else ""
         except CollisionError as error:
             delay, why = None, str(error)
@@ -132,20 +158,74 @@ def compared(
         yield row | {"delay_s": delay, "above_percent": above, "error": why}
 
 
-def _check(site: Site, arrivals: Arrivals) -> None:
-    for it in site.types:
-        COVERS.check("the optimum", it)
-        if it.sumo is not None:
-            raise InputError(
-                f"the optimum is for vehicles with minisim's own rules, got sumo={it.sumo!r}"
-            )
-    factors = arrivals.speed_factor
-    if factors is not None and (factors != 1.0).any():
-        raise InputError("the optimum is for drivers that are alike, got speed factors")
+def mean_delay(run: Run) -> float | None:
+    """The mean delay of a run [s]; None if a vehicle has not arrived."""
+    values = delays(run)
+    return None if np.isnan(values).any() else _mean(values)
 
 
-def _queue(enters: Floats, lane: Ints, kind: Ints, needs: Needs) -> Queue:
+def delays(run: Run) -> Floats:
+    """The delay of each vehicle [s], shape (k,); NaN if it has not arrived."""
+    trips, movements = run.columns, run.site.intersection.movements
+    kind = trips.type * len(movements) + movements.index_of[trips.lane, trips.manoeuvre]
+    at_limit = _at_limit(run.site, run.scenario.depart_speed)
+    return np.asarray(trips.arrival - trips.demand_time - at_limit[kind])
+
+
+def _least_delay(run: Run) -> float | None:
+    if run.scenario.warmup:
+        raise InputError("the least delay is that of all vehicles; leave out the warm-up")
+    try:
+        return optimum(run.scenario, run.seed).bound
+    except InputError:
+        return None
+
+
+def _above(run: Run) -> float | None:
+    delay, least = mean_delay(run), _least_delay(run)
+    return 100.0 * (delay - least) / least if least and delay is not None else None
+
+
+DELAY = Metric(
+    "delay_s", delays, "s", "trip", "run and trips", title="delay",
+    meaning="against driving on at the limits of the roads, whatever zones a controller has",
+    equation="arrival − demand − way/limits (ours; docs/optimum.md)",
+)  # fmt: skip
+LEAST = Metric(
+    "least_delay_s", _least_delay, "s", title="least delay",
+    meaning="no controller has a mean delay below it; none if it is not known",
+    equation="best order by dynamic programming (ours; docs/optimum.md)",
+)  # fmt: skip
+ABOVE = Metric(
+    "above_least_percent", _above, "%", title="above the least delay",
+    meaning="mean delay against the least possible; none if a vehicle has not arrived",
+    equation="100·(delay − least)/least (ours; docs/optimum.md)",
+)  # fmt: skip
+
+
+def _mean(values: Floats) -> float:
+    return float(values.sum()) / max(len(values), 1)
+
+
+def _at_limit(site: Site, depart_speed: float | None) -> Floats:
+    """What the whole way takes at the limits, by kind [s]."""
+    return np.array([way.at_limit for way in drives(alike(site), depart_speed)])
+
+
+@lru_cache(maxsize=32)
+def _bound(site: Site, depart_speed: float | None, time: bytes, lane: bytes, kind: bytes) -> float:
+    """`Optimum.bound`, kept: a process often runs several controllers on the same arrivals."""
+    came, kinds = np.frombuffer(time), np.frombuffer(kind, np.int64)
+    needs = necessary(site, depart_speed)
+    queue = _queue(came, np.frombuffer(lane, np.int64), kinds, needs, site.dt)
+    least = scheduled(queue, needs.rules).bound - float((came + needs.at_limit[kinds]).sum())
+    return max(least, 0.0) / max(len(came), 1)
+
+
+def _queue(came: Floats, lane: Ints, kind: Ints, needs: Needs, dt: float) -> Queue:
     """The vehicles, by lane; none comes before it would behind the one ahead of it, if alone."""
+    order = np.lexsort((came, lane))
+    enters, lane, kind = (np.ceil(came / dt - 1e-6) * dt)[order], lane[order], kind[order]
     behind = np.diff(enters, prepend=-math.inf)
     behind[np.diff(lane, prepend=-1) > 0] = math.inf
     # A larger time behind only makes the loss smaller.

@@ -30,9 +30,11 @@ class Scenario:
         optional=True,
         default=None,
     )
-    horizon: float = real(
-        "simulated time; arrivals come until then", "s", above=0, high=1e7, default=3600.0
-    )
+    horizon: float = real("simulated time", "s", above=0, high=1e7, default=3600.0)
+    demand_time: float | None = real(
+        "vehicles come until then; none means until the horizon", "s",
+        above=0, optional=True, default=None,
+    )  # fmt: skip
     warmup: float = real(
         "trips demanded, close calls and counts before it are left out; only "
         "collisions always count", "s", low=0, default=0.0,
@@ -43,16 +45,19 @@ class Scenario:
 
     def __post_init__(self) -> None:
         number("warmup [s]", self.warmup, below=self.horizon)
+        if self.demand_time is not None:
+            number("demand_time [s]", self.demand_time, high=self.horizon)
         n = self.intersection.n
         allowed = self.intersection.allowed_by_lane
-        self.demand.check(n, self.horizon, allowed)
+        self.demand.check(n, self.until, allowed)
         self.vehicles.check(n)
         if self.recorded is not None:
             self.recorded.check(n, allowed)
             if self.recorded.type is not None:
                 self._check_types(self.recorded.type)
-            if len(self.recorded) and (first := self.recorded.time[0]) >= self.horizon:
-                told = f"the horizon of {self.horizon:g} s"
+            if len(self.recorded) and (first := self.recorded.time[0]) >= self.until:
+                told = f"the {'horizon' if self.demand_time is None else 'demand time'} of "
+                told += f"{self.until:g} s"
                 if origin := self.recorded.origin:
                     told += f" from {clock(origin)} on"
                 raise InputError(
@@ -90,6 +95,11 @@ class Scenario:
         return f"the fleet {self.fleet} replaces that of the demand {self.demand.words[0]!r}"
 
     @property
+    def until(self) -> float:
+        """Vehicles come until then [s]."""
+        return self.horizon if self.demand_time is None else self.demand_time
+
+    @property
     def profile_name(self) -> str:
         """The name of its profile."""
         return self.profile.name
@@ -111,8 +121,8 @@ class Scenario:
         """Mean inflow of each lane [veh/h]."""
         n = self.intersection.n
         if self.recorded is not None:
-            return self.recorded.rates(n, self.horizon)
-        return self.demand.inflow(n, self.intersection.allowed_by_lane).mean(0.0, self.horizon)
+            return self.recorded.rates(n, self.until)
+        return self.demand.inflow(n, self.intersection.allowed_by_lane).mean(0.0, self.until)
 
     def site(self, seed: int = 0) -> Site:
         """What a controller may know about the scenario."""
@@ -134,6 +144,6 @@ class Scenario:
     def arrivals(self, seed: int) -> Arrivals:
         """The arrival table for one seed, the same for every controller."""
         if self.recorded is not None:
-            return self.recorded.between(0.0, self.horizon)
+            return self.recorded.between(0.0, self.until)
         junction = self.intersection
-        return self.demand.draw(junction.n, self.horizon, seed, junction.allowed_by_lane)
+        return self.demand.draw(junction.n, self.until, seed, junction.allowed_by_lane)

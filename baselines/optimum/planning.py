@@ -44,12 +44,13 @@ def _drivable(site: Site, buffer: float, depart_speed: float | None) -> Needs:
             continue
         if not junction.movements.apart[p, q]:
             least = _following(site, ways, (i, j), marks, float(reach[p, q]))
-        elif (near := region(junction, types[i // m], p, q, types[j // m])) is not None:
+        else:
+            near = region(junction, types[i // m], p, q, types[j // m])
+            if near is None or not near.close.any():
+                continue
             rows, columns = np.nonzero(near.close)
             first, second = ways[i].until((rows + 1) * STEP), ways[j].until(columns * STEP)
             least = float((first - second).max() + buffer + marks[j] - marks[i])
-        else:
-            continue
         between[i, j] = max(least, LEAST)
     exits = np.tile(junction.movements.exits, len(types))
     joins = (between > -np.inf) & (exits[:, None] == exits)

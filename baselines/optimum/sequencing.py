@@ -7,6 +7,11 @@ Moudni 2009, IFAC 42(15):252, have this for two lanes). Times before the next ve
 be there say nothing, so states become equal where a junction falls empty, and there are few of
 them.
 
+Where there are too many states, those with the same numbers become one that is as good as each of
+them (a relaxed decision diagram: Bergman, Cire, van Hoeve, Hooker 2016, Decision Diagrams for
+Optimization, ch. 4). What comes out is still below the sum of every order, but no longer that of
+one.
+
 If one vehicle can have passed before another could come, it goes first, unless those behind it on
 its exit lane lose more than it gains: otherwise it could be moved there, to the good of all.
 """
@@ -31,8 +36,9 @@ ROUNDING = 1e-9
 #: of times counts so much less.
 TIE = 1e-6
 
-#: The most states at once. Hours below saturation have some tens.
-MOST = 2_000
+#: The most states at once; hours below saturation have some tens. There may be more different
+#: numbers, but not without end.
+MOST, LARGEST = 2_000, 10_000
 
 #: Spacing of the tables of `Rules.wake` [s].
 WAKE_STEP = 0.05
@@ -83,11 +89,12 @@ def timed(queue: Queue, rules: Rules, order: Ints) -> tuple[Floats, Floats]:
     return time, arrival
 
 
-def scheduled(queue: Queue, rules: Rules, exact: bool = True) -> Schedule:
+def scheduled(queue: Queue, rules: Rules, bounded: bool = True) -> Schedule:
     """The order in which vehicles arrive earliest in sum.
 
-    With more than `MOST` states at once, `InputError` if it has to be `exact`. Otherwise only the
-    cheapest states go on, and the order may not be the best; `bound` only holds if it is exact.
+    With more than `MOST` states at once, the order may not be the best: states are merged, and
+    `bound` still holds; `InputError` for more than `LARGEST` different numbers. If the bound need
+    not hold, only the cheapest states go on, which gives better orders.
     """
     k, starts = len(queue.kind), queue.begins[:-1]
     due, lanes = _due(queue, len(rules.rest)), np.arange(len(starts))
@@ -100,12 +107,15 @@ def scheduled(queue: Queue, rules: Rules, exact: bool = True) -> Schedule:
         at, free, ahead, cost, parent, lane = _next(queue, rules, due, at, free, ahead, cost)
         kept = _undominated(rules, at, free, ahead, cost)
         if len(kept) > MOST:
-            if exact:
-                raise InputError(
-                    f"the best order of these {k} vehicles would take too long: more than {MOST} "
-                    "states at once; less demand or a shorter horizon helps"
-                )
-            kept = kept[np.argsort(cost[kept], kind="stable")[:MOST]]
+            if bounded:
+                kept, free, ahead = _merged(at, free, ahead, kept)
+                if len(kept) > LARGEST:
+                    raise InputError(
+                        f"the least delay of these {k} vehicles would take too long: more than "
+                        f"{LARGEST} states at once; less demand or a shorter horizon helps"
+                    )
+            else:
+                kept = kept[np.argsort(cost[kept], kind="stable")[:MOST]]
         at, free, ahead, cost = at[kept], free[kept], ahead[kept], cost[kept]
         steps.append((parent[kept], lane[kept]))
         widest = max(widest, len(kept))
@@ -115,9 +125,10 @@ def scheduled(queue: Queue, rules: Rules, exact: bool = True) -> Schedule:
         passed[lane[row]] -= 1
         order[i], row = passed[lane[row]], int(parents[row])
     time, arrival = timed(queue, rules, order)
-    # Of all orders, this has the least sum with its ties, and no order saves more than their part.
-    late = float((arrival - queue.ready - rules.rest[queue.kind]).sum())
-    return Schedule(order, time, arrival, float(arrival.sum()) - TIE * late, widest)
+    # No order costs less, and none is as late at its marks as at its arrivals: of each, ties are at
+    # most this part.
+    alone = float((queue.ready + rules.rest[queue.kind]).sum())
+    return Schedule(order, time, arrival, alone + float(cost.min()) / (1.0 + TIE), widest)
 
 
 def _due(queue: Queue, kinds: int) -> Floats:
@@ -239,6 +250,24 @@ def _undominated(rules: Rules, at: Ints, free: Floats, ahead: Floats, cost: Floa
     key = np.ravel_multi_index(tuple((at - low).T), tuple(spans))
     order: npt.NDArray[np.int64] = np.lexsort((cost, key))
     return order[_best(rules, key[order], free[order], ahead[order], cost[order])]
+
+
+def _merged(at: Ints, free: Floats, ahead: Floats, kept: Ints) -> tuple[Ints, Floats, Floats]:
+    """Keep the cheapest states of each set of numbers; the last of them stands for the others.
+
+    It may come as early as each of them and costs no more than any: `kept` is sorted by set, then
+    by cost. Returns the indices of the states that stay, and `free` and `ahead` of all.
+    """
+    new = np.append(True, (at[kept[1:]] != at[kept[:-1]]).any(axis=1))
+    begins = np.flatnonzero(new)
+    room = max(MOST // len(begins), 1)
+    place = np.arange(len(kept)) - begins[np.cumsum(new) - 1]
+    stays = np.flatnonzero(place < room)
+    merged = []
+    for times in (free, ahead):
+        times[kept[stays]] = np.minimum.reduceat(times[kept], stays, axis=0)
+        merged.append(times)
+    return kept[stays], merged[0], merged[1]
 
 
 @allocating

@@ -25,7 +25,10 @@ from scenarios.termination import Terminated, terminable
 __all__ = ["COMMANDS", "app", "main"]
 
 #: The help lists these first, then the others by name.
-_FIRST = ("demo", "run", "controllers", "animate", "sweep", "figures", "reproduce", "crossval")
+_FIRST = (
+    "demo", "run", "controllers", "animate", "sweep", "figures", "reproduce", "benchmark",
+    "crossval",
+)  # fmt: skip
 
 #: The names of the commands, in the order of the help.
 COMMANDS = tuple(sorted(

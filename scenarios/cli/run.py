@@ -45,6 +45,7 @@ def run(
     lane_width: options.LaneWidth = None,
     seed: options.Seed = 0,
     horizon: options.Horizon = None,
+    demand_time: options.DemandTime = None,
     warmup: Annotated[float, option("Measure only after this.", "S")] = 0.0,
     on_collision: Annotated[str, option("stop, record, or teleport (SUMO).", "DO")] = "stop",
     no_safety: Annotated[bool, option("Do not measure TTC and PET.", None, "--no-safety")] = False,
@@ -96,7 +97,8 @@ def run(
     junction = options.build_scenario(
         scenario, bearings, arrivals, start, demand, density=density, split=split, turns=turns,
         unit=unit, fleet=fleet, lane_width=lane_width,
-        profile=profile, side=side, node=node, horizon=horizon, warmup=warmup,
+        profile=profile, side=side, node=node, horizon=horizon, demand_time=demand_time,
+        warmup=warmup,
     )  # fmt: skip
     recipe = Recipe(
         junction, controller_named(controller, profile), seed, humans, latency, jitter, loss,

@@ -88,14 +88,25 @@ def read_experiments(
         InputError: an unknown key (with the nearest one), a value that is not allowed, or a
             combination that cannot be run; the message names file, block and key.
     """
-    place = os.fspath(path)
-    try:
-        table = tomllib.loads(read_file("experiments", path).decode())
-    except (ValueError, RecursionError) as error:
-        raise FileError(f"{place} is not valid TOML: {error}") from error
-    blocks = table.pop("experiment", [{}])
     given = {"seeds": seeds, "horizon": horizon}
     overrides = {key: value for key, value in given.items() if value is not None}
+    return experiments_of(read_toml("experiments", path), path, overrides)
+
+
+def read_toml(what: str, path: str | os.PathLike[str]) -> dict[str, Any]:
+    """The table of a TOML file; raises `FileError`."""
+    try:
+        return tomllib.loads(read_file(what, path).decode())
+    except (ValueError, RecursionError) as error:
+        raise FileError(f"{os.fspath(path)} is not valid TOML: {error}") from error
+
+
+def experiments_of(
+    table: Mapping[str, Any], path: str | os.PathLike[str], overrides: Mapping[str, Any]
+) -> list[Recipe]:
+    """The recipes of a file's table; `overrides` replace keys of all blocks; raises as above."""
+    place, table = os.fspath(path), dict(table)
+    blocks = table.pop("experiment", [{}])
     with _at(place):
         _check_keys("key", table, [*AXES, *SINGLE, "experiment"])
         if not isinstance(blocks, list) or not all(isinstance(block, dict) for block in blocks):
@@ -179,7 +190,7 @@ def _scenario(chosen: dict[str, Any], folder: Path) -> Scenario:
         chosen = {key: value for key, value in chosen.items() if key not in DRAWN}
     elif chosen["model"] != "shifted":
         del chosen["min_headway"]
-    for key in ("side", "horizon"):
+    for key in ("side", "horizon", "demand_time"):
         if chosen[key] is None:
             del chosen[key]
     with _at("scenario"):

@@ -145,7 +145,7 @@ def _warm(recipes: Iterable[Recipe], pool: Executor) -> None:
     """
     for recipe in {type(it.scenario.profile.vehicle): it for it in recipes}.values():
         dt = recipe.scenario.profile.dt
-        scenario = replace(recipe.scenario, horizon=dt, warmup=0.0, recorded=None)
+        scenario = replace(recipe.scenario, horizon=dt, demand_time=None, warmup=0.0, recorded=None)
         try:
             tried = handed(pool, outcome_of, replace(recipe, scenario=scenario))
         except BrokenExecutor:

@@ -12,7 +12,8 @@ import pytest
 from minisim.counts import read_counts
 from tests import ROOT
 
-PAGES = ("README.md", *(f"docs/{name}.md" for name in ("counts", "messages", "pcu", "safety")))
+DOCS = "benchmark", "counts", "messages", "pcu", "safety"
+PAGES = ("README.md", *(f"docs/{name}.md" for name in DOCS))
 
 
 def blocks(page: str, kind: str = "python") -> list[str]:

@@ -39,6 +39,7 @@ ODD = ("", " ", "\N{BLACK CIRCLE}", "x" * 300, "x" * 300 + ".toml", "x" * 5000, 
 #: Command -> what it is about, and what keeps it short; words drawn may come between them.
 COMMANDS = {
     "run": ("three-way", ("--horizon", "20")),
+    "benchmark": ("bad.toml", ()),
     "sweep": ("good.toml", ("--horizon", "5", "--jobs", "1")),
     "harmony": ("four-way", ()),
     "decide": ("four-way", ("a1", "b2")),

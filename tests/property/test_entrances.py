@@ -34,6 +34,10 @@ def answered(*arguments: str) -> str:
     return printed.getvalue()
 
 
+def _flag(key: str) -> str:
+    return f"--{key.replace('_', '-')}"
+
+
 def flat(summary: dict[str, Any], prefix: str = "") -> dict[str, Any]:
     found: dict[str, Any] = {}
     for key, value in summary.items():
@@ -58,6 +62,7 @@ def said(draw: st.DrawFn) -> dict[str, Any]:
         "profile": draw(st.sampled_from(["paper", "fair"])),
         "side": draw(st.sampled_from(["left", "right"])),
         "horizon": draw(st.sampled_from([60.0, 150.0])),
+        "demand_time": draw(st.sampled_from([40.0, 60.0])),
         "warmup": draw(st.sampled_from([0.0, 20.0])),
         "seed": draw(st.integers(0, 5)),
     }
@@ -65,20 +70,24 @@ def said(draw: st.DrawFn) -> dict[str, Any]:
 
 ERRING = {
     "scenario": "four-way", "controller": NOISY, "density": 400.0, "split": "4:3:2:1",
-    "profile": "fair", "side": "left", "horizon": 300.0, "warmup": 30.0, "seed": 1,
+    "profile": "fair", "side": "left", "horizon": 300.0, "demand_time": 290.0, "warmup": 30.0,
+    "seed": 1,
 }  # fmt: skip
 
 
 @given(said())
 @example({**ERRING, "humans": 0.0})
 @example({**ERRING, "humans": 0.3})
-@example({**ERRING, "controller": "dim", "humans": 0.3, "horizon": 60.0, "warmup": 20.0, "seed": 3})
+@example({
+    **ERRING, "controller": "dim", "humans": 0.3, "horizon": 60.0, "demand_time": 60.0,
+    "warmup": 20.0, "seed": 3,
+})  # fmt: skip
 @example({**ERRING, "controller": "reservation", "latency": 0.2, "jitter": 0.1, "loss": 0.3})
 @share(0.05)
 def test_the_same_recipe_has_the_same_numbers_everywhere(said: dict[str, Any]) -> None:
     options = {**said, "on-collision": "record"}
     scenario = options.pop("scenario")
-    words = [word for key, value in options.items() for word in (f"--{key}", str(value))]
+    words = [w for key, value in options.items() for w in (_flag(key), str(value))]
     words += ["--metrics", ",".join(ASKED), "--json"]
     printed = flat(json.loads(answered("run", scenario, *words)))
 
@@ -93,7 +102,7 @@ def test_the_same_recipe_has_the_same_numbers_everywhere(said: dict[str, Any]) -
     demand = {key: said[key] for key in ("density", "split", "turns") if key in said}
     drawn = scenario_named(
         scenario, **demand, profile=said["profile"], side=said["side"],
-        horizon=said["horizon"], warmup=said["warmup"],
+        horizon=said["horizon"], warmup=said["warmup"], demand_time=said["demand_time"],
     )  # fmt: skip
     recipe = Recipe(
         drawn, controller_named(said["controller"], said["profile"]), said["seed"],

@@ -15,7 +15,7 @@ from minisim.control import NOTHING, Advise, Brake, Command, Controller, Plan, S
 from minisim.simulation import simulate
 from scenarios.controllers import SAFE, controller_named
 from scenarios.library import five_way, four_way, three_way
-from scenarios.optimum import Drained, optimum
+from scenarios.optimum import drained, mean_delay, optimum
 from scenarios.profiles import FAIR, PAPER
 from scenarios.scenario import Scenario
 from scenarios.strategies import scenarios
@@ -67,7 +67,7 @@ def bursts(draw: st.DrawFn, lanes: int | None = None) -> Scenario:
 
 def check(scenario: Scenario, controller: Controller, seed: int = 0) -> None:
     least = optimum(scenario, seed)
-    delay = least.delay(simulate(Drained(scenario), controller, seed))
+    delay = mean_delay(simulate(drained(scenario), controller, seed))
     assert delay is not None
     assert least.bound <= delay + 1e-9
 

@@ -51,6 +51,7 @@ Node = Annotated[str | None, option("Of a town's network; see minisim junction."
 Bearings = Annotated[str | None, option("Custom's arms, from north.", "0,90,…")]
 Seed = Annotated[int, option("Seed of the arrivals; 0 by default.", "N", "--seed", "-s")]
 Horizon = Annotated[float | None, option("Simulated time; 3600 by default.", "S")]
+DemandTime = Annotated[float | None, option("Vehicles come until then; the horizon.", "S")]
 Order = Annotated[
     str,
     typer.Option(

@@ -8,7 +8,7 @@ import pytest
 from minisim import simulate
 from minisim.arrivals import Arrivals
 from minisim.control import Unregulated
-from minisim.demand import Demand
+from minisim.demand import Demand, DemandProfile, Period
 from minisim.errors import InputError
 from minisim.junction.geometry import Intersection
 from minisim.vehicle import VehicleType
@@ -91,6 +91,11 @@ def test_the_horizon_is_exclusive() -> None:
     ("change", "message"),
     [
         ({"warmup": 60, "horizon": 60}, r"warmup \[s\] must be below 60"),
+        ({"demand_time": 61, "horizon": 60}, r"demand_time \[s\] must be at most 60, got 61"),
+        (
+            {"demand_time": 9, "horizon": 60, "recorded": table((10.0, 0, 1))},
+            "no vehicle comes within the demand time of 9 s",
+        ),
         ({"demand": Demand(density=350, turns=(1, 1))}, "turns has 2 shares for 3 manoeuvres"),
         ({"demand": Demand(density=1000, split=(1, 0, 0, 0))}, "at most 3600"),
         ({"recorded": table((0.0, 4, 1))}, "lane e is not in the geometry"),
@@ -105,3 +110,29 @@ def test_parts_of_a_scenario_fit_together(change: dict[str, object], message: st
 def test_no_vehicle_departs_faster_than_the_limit() -> None:
     with pytest.raises(InputError, match=r"depart_speed .* at most 14"):
         Profile(name="x", vehicle=VehicleType(), speed_limit=14.0, depart_speed=15.0)
+
+
+def test_vehicles_may_stop_coming_before_the_horizon() -> None:
+    """They are those of a shorter run, at the same rates, and have time to arrive."""
+    short = Scenario(**{**BASE, "horizon": 60.0})
+    drained = Scenario(**{**BASE, "horizon": 400.0, "demand_time": 60.0})
+    assert (drained.until, short.until) == (60.0, 60.0)
+    assert drained.site(1) == short.site(1)
+    ours, theirs = drained.arrivals(1), short.arrivals(1)
+    assert (ours.time == theirs.time).all()
+    run = simulate(drained, Unregulated(), 1, on_collision="record")
+    assert run.columns.arrived.all()
+    assert not simulate(short, Unregulated(), 1, on_collision="record").columns.arrived.all()
+
+
+def test_recorded_arrivals_and_a_day_stop_at_the_demand_time_too() -> None:
+    recorded = table((1.0, 0, 1), (50.0, 1, 1))
+    made = Scenario(**{**BASE, "horizon": 100.0, "demand_time": 20.0, "recorded": recorded})
+    assert len(made.arrivals(0)) == 1
+    assert made.rates == (180.0, 0.0, 0.0, 0.0)
+    minute = Period(start="07:00", end="07:01", rates=(360.0, 0.0, 0.0, 0.0))
+    day = DemandProfile(periods=(minute,))
+    made = Scenario(**{**BASE, "horizon": 100.0, "demand_time": 60.0, "demand": day})
+    assert made.rates == (360.0, 0.0, 0.0, 0.0)
+    with pytest.raises(InputError, match="ends 60 s after its start, before the run of 70 s"):
+        Scenario(**{**BASE, "horizon": 100.0, "demand_time": 70.0, "demand": day})

@@ -114,3 +114,13 @@ def test_a_verdict_without_runs_says_how_to_make_them(name: str) -> None:
     assert study.verdict is not None
     said = study.verdict(Results.of(study, effort, [(point, None) for point in study.points]))
     assert effort.command(name) in said
+
+
+def test_the_optimum_study_has_a_schedule_beside_the_rivals_and_time_for_every_vehicle() -> None:
+    study = study_named("optimum")
+    assert {point.series for point in study.points} == {"schedule", *RIVALS}
+    for point in study.points[:: len(study.points) // 7]:
+        recipe = point.recipe(2, 1000.0)
+        assert recipe.name == point.series
+        assert (recipe.scenario.until, recipe.scenario.horizon) == (500.0, 2100.0)
+    assert len(study.runs(10)) == 12 * 10 * (1 + len(RIVALS))

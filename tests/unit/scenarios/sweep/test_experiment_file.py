@@ -52,6 +52,7 @@ SAID = [
         'loss = [0, 0.25]\nlatency = 0.1\nseeds = [1]\ncontroller = "v2ic"\n',
         [Recipe(four_way(), V2IC(), 1, latency=0.1, loss=loss) for loss in (0, 0.25)],
     ),
+    ("seeds = [1]\ndemand_time = 60", [Recipe(four_way(demand_time=60.0), Dim(), 1)]),
     ('seeds = [1]\nsplit = "(4,3,2,1)"', [Recipe(four_way(split=(4, 3, 2, 1)), Dim(), 1)]),
     (
         "seeds = [1]\nsplit = [4, 3, 2, 1]\nturns = [1, 2, 1]",

@@ -1,0 +1,1 @@
+"""The benchmark: a fixed set of scenarios on which every controller is measured and ranked."""
