@@ -208,11 +208,14 @@ class FixedTimeSession:
         # In SUMO, a switch acts on the move that ends at its time.
         self._early = site.dt if site.looks_out else 0.0
         self._half_step = site.dt / 2.0
+        self._wanted: list[Colour] = []
+        self._until = -math.inf  # when the program shows something else [s]
 
     def decide(self, view: View) -> Iterable[Command]:
         """Turn the heads to what the program shows; a switch less than half a step away is due."""
         now = view.time + self._half_step + self._early
-        wanted = self._programs.colours(now)
-        commands = self._heads.show(view, wanted)
-        switch = self._programs.next_switch(now) - self._early
-        return [*commands, Wake(min(switch, self._heads.next_look))]
+        if now >= self._until:
+            self._wanted = self._programs.colours(now)
+            self._until = self._programs.next_switch(now)
+        commands = self._heads.show(view, self._wanted)
+        return [*commands, Wake(min(self._until - self._early, self._heads.next_look))]

@@ -84,6 +84,8 @@ class Heads:
 
         One answer closes lanes before it opens others.
         """
+        if wanted == self.colours:
+            return []
         commands: list[Command] = []
         self._let_go.intersection_update(v.id for v in view.vehicles)
         for lane, colour in enumerate(wanted):
