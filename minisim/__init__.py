@@ -10,13 +10,9 @@
 The names below are loaded on first use, so `import minisim` is quick.
 """
 
-import importlib
-
+from minisim.lazy import TYPE_CHECKING, loader
 from minisim.version import __version__
 
-# Not typing's: `python -m minisim` imports this first, and may find a typing.py (or __future__.py)
-# in the working directory. Type checkers know the name.
-TYPE_CHECKING = False
 if TYPE_CHECKING:
     from minisim.arrivals import Arrivals
     from minisim.counts import read_counts
@@ -32,21 +28,21 @@ if TYPE_CHECKING:
     from minisim.town import read_junction
     from minisim.vehicle import VehicleType
 
-_NAMES = {
-    "minisim.arrivals": ("Arrivals",),
-    "minisim.counts": ("read_counts",),
-    "minisim.demandfile": ("read_demand", "write_demand"),
-    "minisim.demand": ("Demand", "DemandProfile", "Period"),
-    "minisim.errors": ("MinisimError",),
-    "minisim.junction.geometry": ("Intersection",),
-    "minisim.junction.movements": ("Movement",),
-    "minisim.junction.roads": ("Road",),
-    "minisim.recorded": ("read_arrivals", "write_arrivals"),
-    "minisim.results.run": ("Run",),
-    "minisim.simulation": ("Simulation", "simulate"),
-    "minisim.town": ("read_junction",),
-    "minisim.vehicle": ("VehicleType",),
-}
+__getattr__ = loader(__name__, {
+    "minisim.arrivals": "Arrivals",
+    "minisim.counts": "read_counts",
+    "minisim.demand": "Demand DemandProfile Period",
+    "minisim.demandfile": "read_demand write_demand",
+    "minisim.errors": "MinisimError",
+    "minisim.junction.geometry": "Intersection",
+    "minisim.junction.movements": "Movement",
+    "minisim.junction.roads": "Road",
+    "minisim.recorded": "read_arrivals write_arrivals",
+    "minisim.results.run": "Run",
+    "minisim.simulation": "Simulation simulate",
+    "minisim.town": "read_junction",
+    "minisim.vehicle": "VehicleType",
+})  # fmt: skip
 
 __all__ = [
     "Arrivals",
@@ -69,13 +65,6 @@ __all__ = [
     "write_arrivals",
     "write_demand",
 ]
-
-
-def __getattr__(name: str) -> object:
-    for module, names in _NAMES.items():
-        if name in names:
-            return getattr(importlib.import_module(module), name)
-    raise AttributeError(f"module 'minisim' has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:

@@ -16,24 +16,12 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from functools import cache
+from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 from types import MappingProxyType
 from typing import Any, Literal, NamedTuple
 
-from baselines import (
-    V2IC,
-    Actuated,
-    Adaptive,
-    AllWayStop,
-    FixedTime,
-    MaxPressure,
-    Platoons,
-    Reservation,
-    Slots,
-    V2ICAsRun,
-)
-from dim import AsRunDim, Dim
-from minisim.control import Controller, Unregulated, as_controller, cover_of
+from minisim.control import Controller, as_controller, cover_of
 from minisim.errors import InputError, nearest, show
 from minisim.spelling import Call, build, call_of, parse_arguments
 from scenarios.loading import controllers_in, has_source, is_maker, load_class
@@ -61,20 +49,26 @@ class Entry(NamedTuple):
     """A row of the table of controllers."""
 
     name: str  # without parameters
-    make: type[Any]  # declares the parameters; its docstring's first line is the help text
+    where: str  # module and class, which is loaded on use
     variants: tuple[Variant, ...] = (Variant(),)  # those that have a look or are rivals
     as_run: str = ""  # what the bare name means under the profile `as_run`, if different
 
+    @property
+    def make(self) -> type[Any]:
+        """Declares the parameters; its docstring's first line is the help text."""
+        module, _, name = self.where.partition(":")
+        return getattr(import_module(module), name)  # type: ignore[no-any-return]
 
-def _rival(look: Look) -> tuple[Variant]:
-    return (Variant("", look, rival=True),)
+
+def _rival(*look: Any) -> tuple[Variant]:
+    return (Variant("", Look(*look), rival=True),)
 
 
 #: Our controllers, the paper's four first; figures show rivals in this order.
 CONTROLLERS: Mapping[str, Entry] = MappingProxyType({
     entry.name: entry
     for entry in (
-        Entry("dim", Dim, (
+        Entry("dim", "dim:Dim", (
             Variant("", Look("DIM", "blue", "o", "-"), rival=True),
             Variant("gate=harmonious", Look("DIM, harmonious gate", "sky", "p", "-"), rival=True),
             Variant("order=lanes", Look("DIM, lanes first", "green", ">", "--")),
@@ -83,30 +77,30 @@ CONTROLLERS: Mapping[str, Entry] = MappingProxyType({
             Variant("order=lanes,priorities=waiting"),
             Variant("monitor=on", Look("DIM with safety monitor", "purple", "H", "-.")),
         ), as_run="dim-as-run"),
-        Entry("fixed-time", FixedTime, (
+        Entry("fixed-time", "baselines:FixedTime", (
             Variant("", Look("fixed-time signal", "vermillion", "s", "--"), rival=True),
             Variant("facing=true", Look("two-phase signal", "vermillion", "d", ":")),
         )),
-        Entry("adaptive", Adaptive, _rival(Look("adaptive signal", "orange", "^", "-."))),
-        Entry("v2ic", V2IC, _rival(Look("V2I-C", "green", "D", ":")), as_run="v2ic-as-run"),
-        Entry("all-way-stop", AllWayStop, _rival(Look("all-way stop", "ink", "X", "--"))),
-        Entry("reservation", Reservation, _rival(Look("reservation", "purple", "v", "-."))),
-        Entry("max-pressure", MaxPressure, (
+        Entry("adaptive", "baselines:Adaptive", _rival("adaptive signal", "orange", "^", "-.")),
+        Entry("v2ic", "baselines:V2IC", _rival("V2I-C", "green", "D", ":"), as_run="v2ic-as-run"),
+        Entry("all-way-stop", "baselines:AllWayStop", _rival("all-way stop", "ink", "X", "--")),
+        Entry("reservation", "baselines:Reservation", _rival("reservation", "purple", "v", "-.")),
+        Entry("max-pressure", "baselines:MaxPressure", (
             Variant("", Look("max-pressure", "brown", "<", ":"), rival=True),
             Variant("facing=true", Look("two-phase max-pressure", "brown", "h", "--")),
         )),
-        Entry("slots", Slots, (
+        Entry("slots", "baselines:Slots", (
             Variant("", Look("slots for batches", "orange", "d", "-")),
             Variant("batch=1", Look("slots, first come first served", "orange", "x", ":")),
         )),
-        Entry("platoons", Platoons, (
+        Entry("platoons", "baselines:Platoons", (
             Variant("", Look("platoons, exhaustive", "ink", "1", "-")),
             Variant("service=gated", Look("platoons, gated", "ink", "2", "-.")),
         )),
-        Entry("actuated", Actuated),
-        Entry("dim-as-run", AsRunDim),
-        Entry("v2ic-as-run", V2ICAsRun),
-        Entry("unregulated", Unregulated),
+        Entry("actuated", "baselines:Actuated"),
+        Entry("dim-as-run", "dim:AsRunDim"),
+        Entry("v2ic-as-run", "baselines:V2ICAsRun"),
+        Entry("unregulated", "minisim.control:Unregulated"),
     )
 })  # fmt: skip
 
@@ -120,8 +114,13 @@ VARIANTS: Mapping[str, Variant] = MappingProxyType({
 #: Spellings of the variants compared on equal terms, in the order used in figures.
 RIVALS = tuple(name for name, variant in VARIANTS.items() if variant.rival)
 
-#: Spellings of the variants that never collide and that serve any number of arms.
-SAFE = tuple(name for name in VARIANTS if cover_of(CONTROLLERS[name.partition(":")[0]].make).laws)
+
+@cache
+def safe() -> tuple[str, ...]:
+    """Spellings of the variants that never collide and that serve any number of arms."""
+    made = {name: entry.make for name, entry in CONTROLLERS.items()}
+    return tuple(name for name in VARIANTS if cover_of(made[name.partition(":")[0]]).laws)
+
 
 #: A class of a caller's own: module or file, class, arguments.
 _CLASS = re.compile(r"(.+?):([A-Za-z_]\w*)(?:\((.*)\))?", re.DOTALL)

@@ -30,7 +30,7 @@ from minisim.junction.geometry import MIN_ANGLE, Intersection
 from minisim.junction.movements import movements_of
 from minisim.junction.roads import Road
 from minisim.vehicle import VehicleType
-from scenarios.controllers import SAFE, controller_named
+from scenarios.controllers import controller_named, safe
 from scenarios.profiles import FAIR, PAPER
 from scenarios.scenario import Scenario
 
@@ -216,4 +216,4 @@ def scenarios(
 
 def controllers() -> st.SearchStrategy[Controller]:
     """Every controller that never collides, and its variants, for the profile `paper`."""
-    return st.sampled_from(SAFE).map(controller_named)
+    return st.sampled_from(safe()).map(controller_named)

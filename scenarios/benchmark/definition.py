@@ -20,7 +20,7 @@ from minisim.errors import InputError, choice, instance, integer
 from minisim.names import name_of
 from minisim.results.metric import Metric
 from minisim.results.metrics import METRICS
-from scenarios.controllers import SAFE, controller_named, plugins
+from scenarios.controllers import controller_named, plugins, safe
 from scenarios.defaults import AXES, SINGLE
 from scenarios.optimum import ABOVE, DELAY, LEAST, Clairvoyant
 from scenarios.recipe import Recipe
@@ -157,7 +157,7 @@ def entrants(
 
     Raises `InputError` for one that is unknown, cannot be made or is named twice.
     """
-    specs = (*(only if only is not None else (*SAFE, *plugins())), *added)
+    specs = (*(only if only is not None else (*safe(), *plugins())), *added)
     made: dict[str, Controller] = {}
     for spec in specs:
         controller = controller_named(spec, "fair")

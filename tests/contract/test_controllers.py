@@ -40,7 +40,7 @@ from minisim.results.run import Run
 from minisim.testing import ContractError, check_commands, check_controller, drained, small_scenario
 from minisim.vehicle import VehicleType
 from scenarios import four_way, three_way
-from scenarios.controllers import SAFE, controller_named
+from scenarios.controllers import controller_named, safe
 from tests.builders import ScriptedSession, as_run, hardest_braking
 
 #: Variants beside those of the table: parameters at their edges, and some together.
@@ -66,12 +66,12 @@ MORE: tuple[Controller, ...] = (
 #: Those whose messages may fail, with some that do.
 FAILING = tuple(
     Linked(it, Channel(latency=0.2, jitter=0.2, loss=0.3))
-    for it in map(controller_named, SAFE)
+    for it in map(controller_named, safe())
     if radio_of(it)
 )
 
 #: Everything that promises no collision; a new controller of the table is among them.
-CONTROLLERS = (*map(controller_named, SAFE), *MORE, *FAILING)
+CONTROLLERS = (*map(controller_named, safe()), *MORE, *FAILING)
 
 
 @pytest.mark.parametrize("controller", CONTROLLERS, ids=lambda c: c.name)
@@ -135,7 +135,7 @@ def test_what_happens_does_not_depend_on_the_horizon(controller: Controller) -> 
     pd.testing.assert_frame_equal(before(short, 120.0), before(long, 120.0))
 
 
-@pytest.mark.parametrize("name", SAFE)
+@pytest.mark.parametrize("name", safe())
 def test_braking_is_comfortable_in_ordinary_traffic(name: str) -> None:
     for road, seed in ((four_way, 1), (three_way, 3)):
         scenario = road(350, profile="fair", horizon=600.0)

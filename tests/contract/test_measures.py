@@ -13,13 +13,13 @@ from minisim.results.metrics import METRICS
 from minisim.results.queues import queue_table
 from minisim.results.run import Run
 from scenarios import four_way
-from scenarios.controllers import SAFE, controller_named
+from scenarios.controllers import controller_named, safe
 
 #: Vehicles that send each other nothing, or whose controllers only show lights.
 SILENT = ("dim", "fixed-time", "adaptive", "actuated", "max-pressure", "all-way-stop")
 
 
-@pytest.fixture(scope="module", params=SAFE)
+@pytest.fixture(scope="module", params=safe())
 def run(request: pytest.FixtureRequest) -> Run:
     scenario = four_way(400, profile="fair", arm_length=150.0, horizon=100.0)
     return minisim.simulate(scenario, controller_named(request.param), 1, record="all", timed=True)

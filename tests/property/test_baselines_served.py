@@ -29,7 +29,7 @@ from minisim.junction.geometry import Intersection
 from minisim.results.safety import encroachments
 from minisim.vehicle import VehicleType
 from scenarios import four_way
-from scenarios.controllers import SAFE, controller_named
+from scenarios.controllers import controller_named, safe
 from scenarios.profiles import FAIR, PROFILES, Profile
 from scenarios.scenario import Scenario
 from scenarios.strategies import demands, floats, intersections, vehicles
@@ -126,7 +126,7 @@ def any_law(draw: st.DrawFn) -> VehicleType:
 
 @share(0.2)
 @given(
-    name=st.sampled_from(SAFE),
+    name=st.sampled_from(safe()),
     vehicle=any_law(),
     limit=st.sampled_from([0.5, 1.0, 100.0]) | floats(0.5, 100.0),
     dt=st.sampled_from([0.05, 0.1, 0.25, 0.5]),

@@ -17,7 +17,7 @@ from minisim.fleet import TYPES, Fleet
 from minisim.junction.conflicts import corridor
 from minisim.results.run import Run
 from scenarios import Scenario, four_way
-from scenarios.controllers import SAFE, controller_named
+from scenarios.controllers import controller_named, safe
 from scenarios.profiles import FAIR, PAPER
 from scenarios.strategies import demands, fleets, floats, intersections
 from tests.builders import digest, drained, share
@@ -81,7 +81,7 @@ def test_nor_do_they_where_the_zones_are_shorter_than_the_vehicles(
 
 
 @share(0.1)
-@given(mixed(), st.sampled_from(SAFE), seeds)
+@given(mixed(), st.sampled_from(safe()), seeds)
 def test_no_vehicles_collide_and_each_is_served(scenario: Scenario, name: str, seed: int) -> None:
     run = served(scenario, name, seed)
     most = [it.max_deceleration for it in run.site.types]
@@ -112,7 +112,7 @@ def test_the_corridor_of_a_fleet_holds_those_of_its_types(
     assert all(whole.covers(corridor(path, it)) for it in fleet.types)
 
 
-@pytest.mark.parametrize("name", SAFE)
+@pytest.mark.parametrize("name", safe())
 def test_every_safe_controller_covers_mixed_fleets(name: str) -> None:
     mix = "motorcycle:0.5,auto-rickshaw:0.2,car:0.2,lcv:0.04,bus:0.03,truck:0.03"
     scenario = four_way(300, fleet=mix, lane_width=3.5, profile="fair", horizon=600.0)

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from minisim.arrivals import Arrivals
 from minisim.control import NOTHING, Advise, Brake, Command, Controller, Plan, Site, View
 from minisim.simulation import simulate
-from scenarios.controllers import SAFE, controller_named
+from scenarios.controllers import controller_named, safe
 from scenarios.library import five_way, four_way, three_way
 from scenarios.optimum import drained, mean_delay, optimum
 from scenarios.profiles import FAIR, PAPER
@@ -72,7 +72,7 @@ def check(scenario: Scenario, controller: Controller, seed: int = 0) -> None:
     assert least.bound <= delay + 1e-9
 
 
-@given(bursts(), st.sampled_from(SAFE))
+@given(bursts(), st.sampled_from(safe()))
 @share(0.4)
 def test_no_controller_has_less_delay_than_the_bound(scenario: Scenario, name: str) -> None:
     check(scenario, controller_named(name))
@@ -93,7 +93,7 @@ def test_the_schedule_can_be_driven(scenario: Scenario) -> None:
 
 
 @pytest.mark.slow
-@given(scenarios(max_arms=5), st.sampled_from(SAFE), st.integers(0, 9))
+@given(scenarios(max_arms=5), st.sampled_from(safe()), st.integers(0, 9))
 @share(0.06)
 def test_the_bound_holds_on_any_junction(scenario: Scenario, name: str, seed: int) -> None:
     check(scenario, controller_named(name), seed)

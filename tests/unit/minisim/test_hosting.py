@@ -14,7 +14,7 @@ from minisim.errors import ControllerError, InputError, MinisimError
 from minisim.hosting import Alarm, checked_window, start
 from minisim.testing import small_scenario
 from minisim.ticks import NEVER
-from scenarios.controllers import SAFE, VARIANTS, controller_named
+from scenarios.controllers import VARIANTS, controller_named, safe
 from scenarios.library import four_way
 from scenarios.profiles import FAIR
 from scenarios.termination import Terminated
@@ -179,7 +179,7 @@ def test_a_plan_that_cannot_act_is_refused(plan: Plan, told: str) -> None:
         minisim.simulate(four_way(horizon=1.0), Fixed(plan))
 
 
-@pytest.mark.parametrize("name", [name for name in SAFE if not name.startswith("dim")])
+@pytest.mark.parametrize("name", [name for name in safe() if not name.startswith("dim")])
 def test_no_plan_of_ours_reaches_beyond_a_short_road(name: str) -> None:
     """The default sight may, and `start` refuses any other."""
     site = four_way(100, arm_length=40.0).site(0)

@@ -14,7 +14,7 @@ from minisim.demand import DemandProfile, Period
 from minisim.errors import InputError
 from minisim.results.service import kind_of_junction, level_of_service, service
 from scenarios import four_way
-from scenarios.controllers import SAFE, controller_named
+from scenarios.controllers import controller_named, safe
 
 
 @pytest.mark.parametrize(
@@ -38,7 +38,7 @@ def test_worked_examples_of_a_stop_controlled_junction() -> None:
     assert "".join(map(level_of_service, delays)) == "AAEDEDDD"
 
 
-@pytest.mark.parametrize("name", SAFE)
+@pytest.mark.parametrize("name", safe())
 def test_signals_are_graded_as_signals_and_all_others_as_unsignalised(name: str) -> None:
     run = simulate(four_way(250, profile="fair", horizon=60.0), controller_named(name))
     signal = isinstance(run.controller, FixedTime | Adaptive | Actuated | MaxPressure)

@@ -13,7 +13,7 @@ from scenarios.benchmark.definition import (
     read_benchmark,
     standard_file,
 )
-from scenarios.controllers import SAFE
+from scenarios.controllers import safe
 
 #: Version -> digest. A changed definition is another benchmark: raise its version.
 DIGESTS = {1: "1ba616220c9edb73"}
@@ -114,7 +114,7 @@ def test_all_that_promise_no_collision_take_part_or_those_that_are_named(tmp_pat
     mine = tmp_path / "benchmark_entrant.py"
     mine.write_text("from baselines import AllWayStop\n\nclass Mine(AllWayStop):\n    name = 'm'\n")
     everyone = [name for name, _ in entrants()]
-    assert set(everyone) >= {*SAFE}
+    assert set(everyone) >= {*safe()}
     assert [name for name, _ in entrants(added=[f"{mine}:Mine"])] == [*everyone, "m"]
     assert [name for name, _ in entrants(["dim", "dim:gate=harmonious"])] == [
         "dim", "dim:gate=harmonious",
