@@ -1,15 +1,15 @@
 """Reservations by messages that fail (`minisim.link`): passages are promises, and none is revoked.
 
-A `Reserve` takes effect when the slowest message has arrived, as in Crossroads (Andert,
-Khayatian, Shrivastava, DAC 2017). Until then the vehicle counts as held, so its passage is
-known even if the manager saw it a while ago. If the message is lost, the vehicle says later
-that it holds nothing. Only then its passage is free again: it may have been heard.
+A `Reserve` takes effect when the slowest message has arrived, as in Crossroads (Andert, Khayatian,
+Shrivastava, DAC 2017). Until then the vehicle counts as held, so its passage is known even if the
+manager last heard of it a while ago. If the message gets lost, the vehicle says later that it holds
+nothing. Only then is its passage free again: until then, the message may have been heard.
 
-A vehicle keeps to its passage within half the `buffer`, or gives it up while it can stop (as
-Dresner and Stone's vehicles cancel), so two in conflict stay out of each other's zones. A
-passage behind a vehicle that did not hear of its own ends like that. What may not be missing is
-a vehicle that slows down another one in its exit lane, which would be early without it: so the
-latter has its request refused until the former has said that it holds.
+A vehicle keeps to its passage within half the `buffer`, or gives it up while it can stop, as the
+vehicles of Dresner and Stone cancel. So two in conflict stay out of each other's zones, and a
+vehicle gives up if the one ahead of it did not hear of its own passage. A vehicle that another one
+slows down in its exit lane would be early without that one. So its request is refused until the
+other has said that it holds.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from minisim.ticks import time_of
 
 
 class PromiseSession(ReservationSession):
-    """One run in which messages fail."""
+    """One run in which messages fail: keeps promises in line with what is heard."""
 
     def __init__(self, controller: Reservation, site: Site) -> None:
         channel, reach = site.channel, controller.reach

@@ -23,6 +23,8 @@ loses its reservation if it can still stop, and so does its follower. So the pas
 that can no longer stop fits those of all others that cannot, and the rest yield. What remains is
 the error of a prediction over the last seconds before the zones, from a state at most one period
 old; `buffer` covers it. Vehicles that differ or follow an unknown law are refused.
+
+If messages fail, no reservation is revoked: see `baselines.promises`.
 """
 
 from __future__ import annotations

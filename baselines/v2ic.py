@@ -11,6 +11,8 @@ leaves. We differ from the source for safety:
   limit, and stops at its line unless the unit has let it go;
 - a vehicle gets the right of way only when every conflicting vehicle ahead in the list *has* left,
   and then keeps it, so two vehicles in conflict never hold it at once;
+- so it is safe with messages that fail (`minisim.link`): a vehicle stays in the list until it has
+  said that it left, and one that did not hear of its right of way stops at its line;
 - leaving times are capped (`leaving_time`): distance over speed explodes at low speed, and a
   crawling vehicle would stop those behind it in the list far from the junction.
 """

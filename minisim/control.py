@@ -248,8 +248,9 @@ class Go:
 class Reserve(Go):
     """Give one vehicle the right of way from `time` on, as long as it keeps to a passage.
 
-    For sessions whose messages fail (`minisim.link`). It is void if it arrives later than `time`.
-    The vehicle gives it up by itself once `keeps(vehicle, time)` is false, if it can still stop.
+    For sessions whose messages fail (`minisim.link`); a host by itself takes it for a `Go`. It is
+    void if it arrives later than `time`, and no `Hold` takes it back. The vehicle gives it up by
+    itself once `keeps(vehicle, time)` is false, if it can still stop.
     """
 
     time: float  # [s]
