@@ -4,7 +4,7 @@
     python -m tests.digests > after.json      # in the new one, on the same machine
     python -m tests.digests before.json after.json
 
-605 runs: every controller under every profile that it serves, on 3 to 6 arms, with both gates,
+629 runs: every controller under every profile that it serves, on 3 to 6 arms, with both gates,
 monitor, noisy perception, human drivers, each car-following law, both sides of the road, skewed
 arms and uneven inflow. A digest covers every byte of the trips and of the recorded trajectories.
 Other processors may round differently in the last digit, so `tests/contract/test_digests.py`
@@ -42,7 +42,7 @@ RULES = (
     "dim:perception=noisy(intent_error=0.15,kind=symmetric)",
     "dim:perception=noisy(unsignalled=(0.29,0.25))", "dim:perception=noisy(occlusion=true)",
     "fixed-time", "fixed-time:equal_greens=true", "adaptive", "actuated", "all-way-stop",
-    "longest-queue", "v2ic", "reservation", "unregulated",
+    "longest-queue", "v2ic", "reservation", "slots", "platoons", "unregulated",
 )  # fmt: skip
 AS_RUN = (
     "dim", "dim-as-run", "dim-as-run:order=size", "dim-as-run:exit_speed=14", "v2ic-as-run",

@@ -76,7 +76,7 @@ def test_the_capacity_of_batches(size: int) -> None:
 
 
 def test_batches_lose_less_time_than_first_come_first_served_and_both_less_than_a_signal() -> None:
-    """At a high demand, as theirs do. Our four arms: 5.7, 6.6 and more than 20 s at 350."""
+    """At a high demand, as theirs do. On our four arms, 5.4 and 6.9 s."""
     scenario = four_way(350, profile="fair", horizon=600.0)
     rivals: tuple[Controller, ...] = (Slots(), Slots(batch=1), FixedTime())
     batch, fair, signal = (
