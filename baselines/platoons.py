@@ -11,7 +11,7 @@ We had the abstract and the captions of the source, not its pseudocode. That emp
 over, without a clearance time, is ours. Separations follow from car following and from conflict
 zones (`baselines.flows`), so vehicles in harmony may pass at once. Their junctions have vehicles
 that cross at full speed. On our four arms, those that turn follow each other no closer than 2.3 s,
-so platoons lose more time than slots: at 350 veh/h/lane (fair) 11.3 s, and 8.6 s if gated, to 5.4 s.
+so platoons lose more time than slots: at 350 veh/h/lane (fair) 11.3 s, 8.6 s if gated, to 5.4 s.
 """
 
 from __future__ import annotations
