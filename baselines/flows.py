@@ -1,11 +1,11 @@
 """Flows of connected vehicles as queues: one server, which a rule gives to one lane after another.
 
-Each vehicle needs the junction from when it comes to its entry, and the next one comes a separation
-later, which depends on both: the shortest within a lane, longer between movements in conflict, none
-between others. A rule chooses the lane of which the first vehicle is next. It looks no further
-ahead than to vehicles that will have come by then.
+A vehicle comes to the junction, and the next one no sooner than a separation later. It depends on
+both: there is one in a lane and between movements in conflict, and none between others. A rule
+chooses the lane of which the first vehicle is next. It knows only of vehicles that will have come
+by then.
 
-A session plans all vehicles in range with the rule, at every look anew, and has them driven in this
+At every look, a session plans for all vehicles in range by the rule, and has them driven in this
 order (`baselines.ordered`). A choice stands once its vehicle holds a passage.
 """
 
@@ -116,7 +116,7 @@ class Flow(ABC):
     covers = Cover(alike=True)
     radio = Radio()
 
-    # As with V2I-C, since the sources leave it open (`baselines.v2ic`).
+    # As with V2I-C (`baselines.v2ic`), since that of the sources could not be had.
     reach: float = real(
         "how far before the junction, on the road, vehicles register", "m",
         low=1, high=2000, default=200.0,
@@ -155,8 +155,8 @@ class FlowSession(OrderedSession):
         self._asked: dict[int, tuple[int, float]] = {}  # how many before it, and when it would come
         self._count = 0  # of those that have asked
         self._planned: list[Served] = []
-        self._rows = site.intersection.movements.rows
-        self._lanes, self._movements = site.intersection.n, len(site.intersection.movements)
+        self._movements = site.intersection.movements
+        self._lanes = site.intersection.n
 
     def decide(self, view: View) -> Iterable[Command]:
         """Plan, grant and advise; choices stand whose vehicles hold a passage."""
@@ -174,7 +174,7 @@ class FlowSession(OrderedSession):
         lines: list[list[Waiting]] = [[] for _ in range(self._lanes)]
         order = []
         for it in self._seen:
-            kind = it.type * self._movements + self._rows[it.lane][it.manoeuvre]
+            kind = self._kind(it)
             if (slot := self.manager.slots.get(it.id)) is not None:
                 order.append(Due(kind, it))
                 time = self._at_mark(slot, kind)
@@ -192,6 +192,8 @@ class FlowSession(OrderedSession):
         """Note new vehicles, the nearest first."""
         new = [it for it in self._seen if it.id not in self._asked]
         for it in sorted(new, key=lambda it: (it.distance, it.lane)):
-            kind = it.type * self._movements + self._rows[it.lane][it.manoeuvre]
-            self._asked[it.id] = self._count, self._when(it, kind, now)
+            self._asked[it.id] = self._count, self._when(it, self._kind(it), now)
             self._count += 1
+
+    def _kind(self, it: Observed) -> int:
+        return it.type * len(self._movements) + self._movements.rows[it.lane][it.manoeuvre]

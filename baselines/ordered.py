@@ -55,8 +55,9 @@ class OrderedSession(ReservationSession):
         self.manager, self.plan = manager, Plan(marks=(reach,), sight=reach)
         self._advice: list[Command] = []
         self._alone: dict[int, float] = {}  # when each passes its mark if it drives on alone [s]
-        self._between, self._past, self._drives = times
-        self._marks = [way.place(t) for way, t in zip(self._drives, self._past, strict=True)]
+        self._between, self._past, ways = times
+        self._marks = [way.place(t) for way, t in zip(ways, self._past, strict=True)]
+        self._finals = [float(way.speed(0.0)) for way in ways]  # at the entry [m/s]
         movements, types = site.intersection.movements, len(site.types)
         self._conflict = np.tile(site.conflicts | ~movements.apart, (types, types))
         self._limit, self._types = site.limit, site.types
@@ -121,7 +122,7 @@ class OrderedSession(ReservationSession):
         It drives at this speed until it has to accelerate or brake for the speed at the entry.
         """
         it, limit, u = self._types[me.type], self._limit(me.lane), me.speed
-        final = float(self._drives[kind].speed(0.0))
+        final = self._finals[kind]
         for _ in range(3):  # the speed depends on where that is, and the other way round
             a = it.acceleration * SHARE if u < final else it.deceleration
             run_up = min(abs(final * final - u * u) / (2.0 * a), max(me.distance - 1.0, 0.0))

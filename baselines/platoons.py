@@ -7,10 +7,11 @@ discipline of a polling model. Exhaustive: a lane is served until no vehicle of 
 Gated: only those are served that have come when its turn begins. Then it is the turn of the next
 lane, clockwise, in which a vehicle waits; if there is none, of the first vehicle that comes.
 
-We have no full text of the source. The model is the one of its delay formulas, for which
-Boon, Winands, Adan and van Wijk (Performance Evaluation 68, 2011, 290–306) have the method; that
-empty lanes are passed over, without a clearance time, is ours. Distances follow from car following
-and conflict zones (`baselines.flows`), so lanes in harmony may be served at once.
+We had the abstract and the captions of the source, not its pseudocode. That empty lanes are passed
+over, without a clearance time, is ours. Separations follow from car following and from conflict
+zones (`baselines.flows`), so vehicles in harmony may pass at once. Their junctions have vehicles
+that cross at full speed. On our four arms, those that turn follow each other no closer than 2.3 s,
+so platoons lose more time than slots: at 350 veh/h/lane (fair) 11.3 s, 8.6 s if gated, to 5.4 s.
 """
 
 from __future__ import annotations

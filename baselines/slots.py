@@ -8,10 +8,15 @@ earliest time. Under BATCH, the first vehicle that has none gets its slot under 
 could have come by then are its batch, N with it at most. In a batch, those of the same flow are
 served in a row, the first vehicle's flow first. A batch of one is FAIR.
 
-The source has two flows of which any two vehicles are in conflict. With more, the next in a batch
-is the first vehicle of a lane that can come earliest, which is the same for two. Distances follow
-from car following and from the conflict zones of the movements, so movements in harmony do not wait
-for each other: FAIR is first come, first served by conflict zones. The source leaves N open.
+We had the abstract and the captions of the source, not its supporting information with the two
+distances and what it does with more than two flows. Ours: the next in a batch is the first vehicle
+of a lane that can come earliest, which is the same for two flows. Distances follow from car
+following and from conflict zones (`baselines.flows`), so movements in harmony do not wait for each
+other. A vehicle comes to a zone so much later than another one leaves it as it would need to drive
+its stopping distance.
+
+So FAIR is first come, first served by conflict zones. `reservation` also considers requests in the
+order in which they are made, but grants what fits, though an earlier one has to wait.
 """
 
 from __future__ import annotations
@@ -31,6 +36,7 @@ class Slots(Flow):
 
     name = Name("slots")
 
+    # At 350 veh/h/lane (fair) the mean time loss is 6.9 s for 1 and 2, 6.0 for 3, 5.4 for 5 and 10.
     batch: int = whole(
         "most vehicles that are served in another order than they came; 1 is first come, first "
         "served", low=1, high=1000, default=10,

@@ -43,7 +43,7 @@ RULES = (
     "dim:perception=noisy(unsignalled=(0.29,0.25))", "dim:perception=noisy(occlusion=true)",
     "fixed-time", "fixed-time:equal_greens=true", "fixed-time:facing=true", "adaptive", "actuated",
     "all-way-stop", "max-pressure", "max-pressure:facing=true", "v2ic", "reservation",
-    "unregulated",
+    "slots", "platoons", "unregulated",
 )  # fmt: skip
 AS_RUN = (
     "dim", "dim-as-run", "dim-as-run:order=size", "dim-as-run:exit_speed=14", "v2ic-as-run",

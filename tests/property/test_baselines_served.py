@@ -39,7 +39,7 @@ from tests.builders import Greens, drained, queues, replayed, share
 AMBERS = st.sampled_from([0.0, 0.04, 2.0, 3.03])
 GREENS = {"min_green": floats(0.5, 10.0), "max_green": floats(10.0, 50.0), "amber": AMBERS}
 
-BUFFERS = st.none() | floats(0.5, 2.0)
+BUFFERS = st.none() | floats(0.0, 2.0)
 
 #: From detectors just before the line to ones beyond short roads, from short to long greens.
 RIVALS: dict[str, st.SearchStrategy[Controller]] = {

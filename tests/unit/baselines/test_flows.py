@@ -11,13 +11,12 @@ import minisim
 from baselines import Slots
 from baselines.flows import Flow, Waiting, plan, separations
 from baselines.slots import Batch
-from minisim.control import Advise, Go, View, Wake
 from minisim.errors import InputError
 from minisim.junction.conflicts import conflict_zones
 from minisim.testing import small_scenario
 from minisim.vehicle import VehicleType
 from scenarios import four_way
-from tests.builders import car, replayed
+from tests.builders import replayed
 
 FOUR = four_way(100, profile="fair")
 SITE = FOUR.site(1)
@@ -73,23 +72,6 @@ def test_by_default_the_second_could_stop_until_the_first_is_gone() -> None:
     stops = SITE.speed_limit / (2.0 * SITE.vehicle.deceleration)
     assert gaps[1] - gaps[0] == pytest.approx(stops - 0.5, abs=0.3)
     assert gaps[2] - gaps[1] == pytest.approx(3.0 - stops, abs=0.3)
-
-
-def test_a_vehicle_that_has_to_wait_is_slowed_down_and_does_not_stop() -> None:
-    scenario = replayed(FOUR, (0.0, 0, 2), (0.0, 1, 2), (0.0, 2, 3), (0.5, 3, 2), horizon=200.0)
-    run = minisim.simulate(scenario, Slots())
-    assert run.columns.arrived.all()
-    assert run.columns.waiting_time.max() == 0.0
-
-
-def test_the_first_to_ask_goes_and_the_other_hears_how_fast() -> None:
-    seen = View(0.0, (car(1, "a2", 100.0, 14.0), car(2, "b2", 101.0, 14.0)))
-    commands = list(Slots().start(SITE).decide(seen))
-    assert {Go(1), Advise(1, math.inf), Wake(0.5)} < set(commands)
-    (advice,) = set(commands) - {Go(1), Advise(1, math.inf), Wake(0.5)}
-    assert isinstance(advice, Advise)
-    assert advice.vehicle == 2
-    assert 0.0 < advice.speed < 14.0
 
 
 def test_vehicles_that_cannot_be_predicted_are_refused() -> None:

@@ -153,7 +153,7 @@ def test_no_default_is_refused_at_any_step(name: str, dt: float) -> None:
 
 
 @pytest.mark.parametrize("spec", [
-    "v2ic:period=0.1", "reservation:period=0.1", "dim:period=0.1",
+    "v2ic:period=0.1", "reservation:period=0.1", "dim:period=0.1", "slots:period=0.1",
     "dim:perception=noisy(delay=0.3,frame=0.1)",
     "dim:perception=noisy(delay=0.3,frame=0.1),period=1",
 ])  # fmt: skip
