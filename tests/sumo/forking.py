@@ -67,7 +67,10 @@ def forking() -> Iterator[socket.socket]:
     ours, its = socket.socketpair()
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), "MINISIM_JIT": "0"}
     command = [sys.executable, "-P", __file__, str(its.fileno())]
-    with subprocess.Popen(command, env=environment, pass_fds=[its.fileno()]):
+    # Ctrl-C is for pytest: without it, nothing asks any more.
+    with subprocess.Popen(
+        command, env=environment, pass_fds=[its.fileno()], start_new_session=True
+    ):
         its.close()
         with ours:
             yield ours
