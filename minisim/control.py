@@ -481,7 +481,7 @@ class Controller(Protocol):
 
     It promises that no `ORDINARY` vehicles collide and that each is served. A controller that
     promises less or more has an attribute `covers`, a `Cover`. One that vehicles talk to has an
-    attribute `radio`, a `Radio`; without it, nothing is sent. One that shows lights, but does not
+    attribute `radio`, a `Radio`; without it, nothing is sent. One that shows lights, but need not
     open lanes, has an attribute `lights` of True, so that its junction counts as signalised.
     """
 

@@ -202,7 +202,9 @@ class FixedTimeSession:
     """Shows programs; called when it switches, and when a vehicle clears the junction."""
 
     def __init__(self, site: Site, heads: Heads, programs: Programs) -> None:
-        self.plan = Plan(wake_on_clear=True, sight=heads.sight, marks=heads.marks)
+        self.plan = Plan(
+            wake_on_clear=True, sight=heads.sight, reach=heads.reach, marks=heads.marks
+        )
         self._programs = programs
         self._heads = heads
         # In SUMO, a switch acts on the move that ends at its time.

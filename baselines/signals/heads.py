@@ -75,7 +75,8 @@ class Heads:
         self._partners: list[tuple[int, ...]] = [()] * len(ways)  # lanes green with each
         self._let_go: set[int] = set()
         self.sight = stopping_sight(site)  #: how far before the junction it must see vehicles [m]
-        self.marks: tuple[float, ...] = ()  #: and where it must see them pass [m]
+        self.reach = 0.0  #: and how far past the entry, even behind the junction [m]
+        self.marks: tuple[float, ...] = ()  #: where it must see them pass [m]
         self.next_look = math.inf  #: when it must see them again, beside its changes [s]
         self.colours = [Colour.RED] * len(ways)
 

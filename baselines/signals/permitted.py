@@ -11,7 +11,8 @@ Vehicles cannot collide, whatever gap drivers would accept:
 - A vehicle goes into a gap only if each vehicle that it yields to is past, or can still stop and
   comes no sooner than this one could have cleared its way.
 - From then on, that other one has the right of way only while the turning one, at its present
-  speed, is out of its way first. It loses it while it can still stop.
+  speed or that of a vehicle ahead if this is lower, is out of its way first. It loses it while it
+  can still stop.
 
 At the end of a green, the first vehicle of a lane that stands there and waits for a gap may still
 go, once no vehicle comes any more (a "sneaker"; the HCM has 1 plus the share of left turns in a
@@ -86,15 +87,24 @@ class PermittedHeads(Heads):
         ]
         self._exits, self._limit = movements.exits.tolist(), site.limit
         self._look = max(LOOK, site.dt)
+        self._ahead: tuple[Observed, ...] = ()  # all vehicles in view, even behind the junction
         self._sneakers: dict[int, int] = {}  # lane: vehicle that may go after its green
         self._went = [-math.inf] * intersection.n  # when the last one of a lane took a gap [s]
+        # Farther on, no vehicle makes one that still turns brake.
+        it, v = site.vehicle, min(max(self._caps), site.speed_limit)
+        gap = it.min_gap + v * it.headway + stopping_distance(v, it.deceleration)
+        self._ends = [path.crossing for path in paths]
+        self.reach = max(self._ends) + 2.0 * it.length + gap
         self.marks = (self.sight,)
         self.sight = min(self.sight + CRITICAL_GAP * site.speed_limit, intersection.approach_length)
 
     def show(self, view: View, wanted: Sequence[Colour]) -> list[Command]:
         """Turn the heads, then let vehicles go and hold others."""
-        commands = super().show(view, wanted)
-        lanes = {lane: list(those) for lane, those in groupby(view.vehicles, lambda v: v.lane)}
+        self._ahead = view.vehicles
+        ends = self._ends
+        here = tuple(v for v in view.vehicles if v.distance + ends[self._way(v)] + v.length >= 0.0)
+        commands = super().show(view._replace(vehicles=here), wanted)
+        lanes = {lane: list(those) for lane, those in groupby(here, lambda v: v.lane)}
         # First those that wait for gaps: the oncoming ones are held in the same answer.
         takers = [v for lane in lanes if (v := self._next_taker(lane, lanes)) is not None]
         takers = [v for v in takers if self._has_gap(v, lanes, view.time)]
@@ -105,7 +115,7 @@ class PermittedHeads(Heads):
         for lane in lanes:
             if self._partners[lane]:
                 commands += self._keep_clear(lane, lanes)
-        waiting = any(self._waits[self._way(v)] for v in view.vehicles)
+        waiting = any(self._waits[self._way(v)] for v in here)
         self.next_look = view.time + self._look if waiting else math.inf
         return commands
 
@@ -161,7 +171,7 @@ class PermittedHeads(Heads):
         for it in self._oncoming(me.lane, lanes):
             its, gone = self._way(it), it.id in self._let_go
             yields = self._yields[way][its]
-            if gone and self._yields[its][way] and not self._is_sure(it, me, lanes):
+            if gone and self._yields[its][way] and not self._is_sure(it, me):
                 return False
             if not (yields or (gone and self._ties[way][its])):
                 continue
@@ -203,14 +213,14 @@ class PermittedHeads(Heads):
                 for x in self._oncoming(lane, lanes)
                 if x.id in self._let_go and self._yields[self._way(x)][way]
             )
-            blocked = blocked or not may or not all(self._is_sure(x, v, lanes) for x in turning)
+            blocked = blocked or not may or not all(self._is_sure(x, v) for x in turning)
             if not blocked and not gone:
                 yield from self._let(v)
             elif blocked and gone and self._stops(v):
                 self._let_go.remove(v.id)
                 yield Hold(v.id)
 
-    def _is_sure(self, turning: Observed, other: Observed, lanes: Lanes) -> bool:
+    def _is_sure(self, turning: Observed, other: Observed) -> bool:
         """Whether a vehicle, at its present speed, is out of another's way before that one comes.
 
         It counts as no faster than its turn and its exit allow, and than any vehicle ahead of it.
@@ -224,8 +234,7 @@ class PermittedHeads(Heads):
             return False
         ahead = [
             v.speed
-            for those in lanes.values()
-            for v in those
+            for v in self._ahead
             if v.distance < turning.distance
             and (v.lane == turning.lane or self._exits[self._way(v)] == self._exits[way])
         ]

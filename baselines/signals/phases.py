@@ -66,7 +66,7 @@ class PhaseSession:
         heads = self._heads = facing or Heads(site)
         sight = min(max(detector_range, heads.sight), road)
         marks = (*(min(mark, road) for mark in marks), *heads.marks)
-        self.plan = Plan(marks=marks, wake_on_clear=True, sight=sight)
+        self.plan = Plan(marks=marks, wake_on_clear=True, sight=sight, reach=heads.reach)
         phases = phases_of(order, site.intersection, facing is not None)
         self._phases = {phase[0]: phase for phase in phases}
         self._order = tuple(self._phases)

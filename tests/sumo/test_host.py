@@ -88,7 +88,7 @@ def furthest_apart(first: Run, second: Run, vehicle: int = 0) -> tuple[float, fl
 
 CONTROLLERS: tuple[Controller, ...] = (
     Dim(), Dim(gate="harmonious"), FixedTime(), FixedTime(facing=True), Adaptive(), AllWayStop(),
-    MaxPressure(), MaxPressure(facing=True), V2IC(), Reservation(), Slots(),
+    MaxPressure(facing=True), V2IC(), Reservation(), Slots(),
     Platoons(service="gated"), Mixed(share=0.5), Mixed(Dim(gate="harmonious"), 1.0),
 )  # fmt: skip
 

@@ -104,26 +104,26 @@ def test_the_busier_lanes_get_more_green() -> None:
 @pytest.mark.parametrize("facing", [False, True])
 @pytest.mark.parametrize("split", [(1, 1, 1, 1), (4, 4, 1, 1), (8, 1, 1, 1)])
 def test_it_serves_every_demand_that_fits(split: tuple[int, ...], facing: bool) -> None:
-    """Varaiya 2013, theorem 2: queues stay bounded if any signal could serve the demand.
+    """Varaiya 2013: queues stay bounded if any signal could serve the demand.
 
     In all, 1080 veh/h fit here. Greens that know as little of the demand, all alike, let the queues
     of uneven demand grow.
     """
-    scenario = four_way(270, split=split, profile="fair", horizon=3600.0)
+    scenario = four_way(270, split=split, profile="fair", horizon=1800.0)
     grown, alike = (
         minisim.simulate(scenario, signal, 1).summary(["queue_growth"])["queue_growth"]
         for signal in (MaxPressure(facing=facing), FixedTime(equal_greens=True))
     )
     assert grown < 8.0
-    assert (alike > 50.0) is (max(split) > 1)
+    assert (alike > 20.0) is (max(split) > 1)
 
 
 def test_what_dim_sees_is_too_little_for_that() -> None:
     """At 8 m it sees whether any wait, not how many, and a lane of few vehicles gets too much."""
-    scenario = four_way(300, split=(8, 1, 1, 1), profile="fair", horizon=3600.0)
+    scenario = four_way(300, split=(8, 1, 1, 1), profile="fair", horizon=1800.0)
     near, far = (
         minisim.simulate(scenario, signal, 1).summary(["queue_growth"])["queue_growth"]
         for signal in (MaxPressure(detector_range=8.0), MaxPressure())
     )
     assert far < 8.0
-    assert near > 50.0
+    assert near > 30.0

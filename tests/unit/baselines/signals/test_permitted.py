@@ -102,10 +102,11 @@ def test_an_oncoming_vehicle_loses_its_right_of_way_while_it_can_stop() -> None:
     assert told(it, car(2, "c2", 23.0, LIMIT), car(3, "c2", 39.0, LIMIT)) == ["Go 2", "Go 3"]
 
 
-def test_a_turning_vehicle_counts_as_no_faster_than_the_one_ahead() -> None:
+@pytest.mark.parametrize("place", [-17.0, -22.0])  # it has left the junction at −18.8 m
+def test_a_turning_vehicle_counts_as_no_faster_than_the_one_ahead(place: float) -> None:
     it = heads()
     told(it, waiting(1, "a3"))
-    crawling = car(7, "a3", -17.0, 0.5)
+    crawling = car(7, "a3", place, 0.5)
     assert told(it, car(1, "a3", -12.0, 7.0), car(2, "c2", 22.0, LIMIT)) == ["Go 2"]
     assert told(it, crawling, car(1, "a3", -12.0, 7.0), car(2, "c2", 22.0, LIMIT)) == ["Hold 2"]
 
@@ -135,6 +136,12 @@ def test_at_the_end_of_green_vehicles_that_can_stop_are_held() -> None:
     assert told(it, car(1, "a2", 18.0, LIMIT), car(2, "a2", 38.0, LIMIT), wanted=ALL_RED) == [
         "Hold 2"
     ]
+
+
+def test_a_vehicle_behind_the_junction_keeps_no_head_red() -> None:
+    it = heads()
+    assert told(it, car(1, "a3", -22.0, 7.0), car(4, "b2", 0.25), wanted=ACROSS) == ["Go 4"]
+    assert it.next_look == math.inf
 
 
 def test_it_looks_often_only_while_a_vehicle_may_have_to_wait() -> None:
