@@ -167,7 +167,7 @@ class Simulation:
         demand, movements = self._hosted.arrivals.time, self.site.intersection.movements
         return self._hosted.result(
             collisions=self.collisions,
-            columns=collect_trips(self._vehicles, demand, movements, self.site.dt, end),
+            columns=collect_trips(self._vehicles[self._row], demand, movements, self.site.dt, end),
             trace=np.concatenate([*self._traces, self._trace[:0]]),
             rows=self._vehicles[["id", "path", "type"]].copy(),
         )

@@ -45,7 +45,7 @@ INTS = 9
 
 def empty_pack(vehicles: Records, lanes: Records, layout: Layout) -> tuple[Floats, Ints]:
     """Room for as many vehicles as fit on the roads, shapes (FLOATS, k) and (INTS, k)."""
-    shortest = min((it.length for it in layout.types), default=1.0)
+    shortest = vehicles["length"].min(initial=np.inf)
     longest_queue = int((layout.ends[:, 1] - layout.ends[:, 3]).max() / shortest) + 2
     most = min(len(vehicles), len(lanes) * longest_queue)
     width = (most + 7) // 8 * 8 + 8

@@ -23,7 +23,7 @@ from minisim.results.metrics import Asked
 from minisim.results.summary import summarise, trip_table
 from minisim.results.tracks import Tracks, tracks_of
 from minisim.results.trajectories import TRAJECTORY_COLUMNS, TYPE
-from minisim.results.trips import Floats, Trips
+from minisim.results.trips import Columns, Floats, Trips
 from minisim.ticks import first_tick
 from minisim.version import __version__
 
@@ -190,27 +190,35 @@ class Run:
 
         return as_html(self)
 
-    @property
-    def recorded(self) -> tuple[Records, Records]:
-        """The recording by time, then vehicle, and what each of it is of: `trace` and `rows`.
+    def recorded(self, before: float = math.inf, past: float = math.inf) -> tuple[Columns, Columns]:
+        """The columns of `trace`, by time, then vehicle, and of `rows` for each of its lines.
 
-        Raises `InputError` if nothing was recorded.
+        Fronts from `before` ahead of the junction to `past` behind it [m]. Raises `InputError` if
+        nothing was recorded.
         """
         if self.record is None:
             raise InputError("no trajectories: simulate with record='junction' or record='all'")
-        trace = self.trace[np.lexsort((self.rows["id"][self.trace["row"]], self.trace["tick"]))]
-        return trace, self.rows[trace["row"]]
+        trace, rows, paths = self.trace, self.rows, self.site.intersection.paths
+        row, s = trace["row"], trace["s"]
+        last = np.array([path.exit for path in paths])[rows["path"]] + past
+        here = np.flatnonzero((s >= paths[0].entry - before) & (s <= last[row]))
+        key = trace["tick"][here] * (1 + rows["id"].max(initial=0)) + rows["id"][row[here]]
+        order = here[np.argsort(key, kind="stable")]
+        row = row[order]
+        lines = {name: trace[name][order] for name in ("tick", "s", "v", "a", "released")}
+        return lines, {name: rows[name][row] for name in ("id", "path", "type")}
 
     @cached_property
     def trajectories(self) -> pd.DataFrame:
         """One row per vehicle and step, the warm-up's too; `InputError` if not recorded."""
         import pandas as pd
 
-        trace, rows = self.recorded
+        trace, rows = self.recorded()
         intersection, types = self.site.intersection, self.site.types
         movements, path_of = intersection.movements, rows["path"]
-        front, heading = np.zeros((2, len(trace), 2))
-        for p, kind in np.unique(rows[["path", "type"]]).tolist():
+        front, heading = np.zeros((2, len(path_of), 2))
+        pairs = np.unique(np.stack([path_of, rows["type"]], axis=-1), axis=0)
+        for p, kind in pairs.tolist():
             here = (path_of == p) & (rows["type"] == kind)
             front[here] = intersection.paths[p].position(trace["s"][here])
             heading[here] = intersection.paths[p].pose(trace["s"][here], types[kind])[1]

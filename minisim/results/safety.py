@@ -38,15 +38,12 @@ from minisim.results.trajectories import (
     check_columns,
     movement_index,
 )  # fmt: skip
-from minisim.results.trips import Ints
+from minisim.results.trips import Columns, Ints
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from minisim.results.run import Run
-
-#: The columns of a table.
-Columns = dict[str, npt.NDArray[Any]]
 
 #: An encounter is critical below these [s] (van der Horst 1990, A time-based analysis of road user
 #: behaviour in normal and critical encounters), or above this [m/s²] (what is comfortable, as in
@@ -98,11 +95,7 @@ def encounters_of(run: Run) -> Encounters:
     """
     from minisim.laws import RECORD_BEFORE, RECORD_PAST
 
-    trace, rows = run.recorded
-    paths = run.site.intersection.paths
-    last = np.array([path.exit + RECORD_PAST for path in paths])[rows["path"]]
-    near = (trace["s"] >= paths[0].entry - RECORD_BEFORE) & (trace["s"] <= last)
-    trace, rows = trace[near], rows[near]
+    trace, rows = run.recorded(RECORD_BEFORE, RECORD_PAST)
     recording = _recording(
         run.site, np.round(trace["tick"] * run.site.dt, 6), rows["id"], rows["path"], rows["type"],
         trace["s"], trace["v"], trace["a"], trace["released"] != 0,
@@ -280,8 +273,12 @@ def _leaders_in_lane(rows: Rows, site: Site) -> tuple[Ints, Ints, Floats]:
     """Rows of followers and of the next vehicles in their lane and way, and the gaps [m]."""
     parts = branch(site.intersection, site.fleet)
     lane = site.intersection.movements.origins[rows.movement]
-    order = np.lexsort((-rows.s, lane, rows.step))
-    group = (rows.step * site.intersection.n + lane)[order]
+    group = rows.step * site.intersection.n + lane
+    order = np.argsort(group, kind="stable")
+    behind = (np.diff(rows.s[order]) <= 0.0) | (np.diff(group[order]) > 0)
+    if not behind.all():  # those of one lane are rarely in another order than in demand
+        order = np.lexsort((-rows.s, group))
+    group = group[order]
     rear = rows.s - rows.length
     followers, leaders = [], []
     pending, back = np.arange(len(order)), 1
@@ -326,7 +323,7 @@ def _passages(rows: Rows, areas: Areas) -> tuple[Ints, Ints, Floats, Floats]:
     if not len(rows.time):
         empty = np.empty((0, areas.enter.shape[1]))
         return np.empty(0, np.int64), np.empty(0, np.int64), empty, empty
-    order = np.lexsort((rows.time, rows.vehicle))
+    order = np.argsort(rows.vehicle, kind="stable")
     vehicle, first, code = np.unique(rows.vehicle[order], return_index=True, return_inverse=True)
     s, movement, type = rows.s[order], rows.movement[order][first], rows.type[order][first]
     last = np.append(first[1:], len(order)) - 1

@@ -15,6 +15,8 @@ from minisim.junction.movements import Movements
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
+#: A table by the names of its columns.
+Columns = dict[str, npt.NDArray[Any]]
 
 
 class Trips(NamedTuple):
@@ -58,13 +60,12 @@ TRIP_ARRAYS: Final = Trips._fields[:-2]
 def collect_trips(
     vehicles: Records, demand_time: Floats, movements: Movements, dt: float, end: float
 ) -> Trips:
-    """The trips of a run that has reached `end` [s], from its vehicle array."""
-    rows = vehicles[np.argsort(vehicles["id"], kind="stable")]
+    """The trips of a run that has reached `end` [s], from its vehicles in the order of demand."""
     return trips_of(
-        demand_time, rows["lane"], rows["manoeuvre"], rows["type"], movements, end,
-        depart=np.where(rows["status"] != WAITING, rows["depart_tick"] * dt, np.nan),
-        arrival=np.where(rows["status"] == ARRIVED, rows["arrival_tick"] * dt, np.nan),
-        waiting_time=rows["waiting_ticks"] * dt, time_loss=rows["lost_ticks"] * dt,
+        demand_time, vehicles["lane"], vehicles["manoeuvre"], vehicles["type"], movements, end,
+        depart=np.where(vehicles["status"] != WAITING, vehicles["depart_tick"] * dt, np.nan),
+        arrival=np.where(vehicles["status"] == ARRIVED, vehicles["arrival_tick"] * dt, np.nan),
+        waiting_time=vehicles["waiting_ticks"] * dt, time_loss=vehicles["lost_ticks"] * dt,
     )  # fmt: skip
 
 

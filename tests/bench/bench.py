@@ -16,13 +16,15 @@ import statistics
 import subprocess
 from collections.abc import Callable, Iterator, Sequence
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
 from tests import ROOT
-from tests.bench import engine, rivals, starting
+from tests.bench import engine, rivals, scalar, starting
 
-DENSITIES = (150, 250, 350, 500, 650, 800)
+#: veh/h/lane, and the nanoseconds wanted for a vehicle-step; there our kernel is compared with C.
+DENSITIES = {150: None, 250: None, 350: -16.0, 500: None, 650: None, 800: -10.0}
 
 
 class Figure(NamedTuple):
@@ -99,7 +101,7 @@ def _taste() -> Iterator[Figure]:
     yield Figure("dim_hour_s", "DIM, a simulated hour", hours, "s")
     step = Figure("step_350_ns", "vehicle-step", [engine.vehicle_step(1, 350, 60.0)], "ns")
     yield step
-    yield from _against_c(step, [engine.ring_step(1000)])
+    yield from _against_c(step, 350, lambda: [scalar.vehicle_step(1, 350, 60.0)])
     yield Figure("minutes_per_s", "one-minute runs", [engine.minutes(1, 2)], "/s")
     yield Figure("junction_4_ms", "new junction of 4 arms", [engine.junction(1, 4)], "ms")
     yield Figure("help_s", "minisim --help", [starting.command("--help")], "s")
@@ -127,23 +129,23 @@ def _rivals(runs: int, hour: Figure, signal: Figure) -> Iterator[Figure]:
 
 
 def _steps(measured: Callable[[Callable[[int], float]], list[float]]) -> Iterator[Figure]:
-    for density in DENSITIES:
-        times = measured(lambda seed, density=density: engine.vehicle_step(seed, density))  # type: ignore[misc]
-        wanted = {350: -16.0, 800: -10.0}.get(density)
+    for density, wanted in DENSITIES.items():
+        times = measured(partial(engine.vehicle_step, density=density))
         label = f"vehicle-step of the kernel, {density} veh/h/lane"
         step = Figure(f"step_{density}_ns", label, times, "ns", wanted)
         yield step
-    yield from _against_c(step, [engine.ring_step() for _ in times])
+        if wanted is not None:
+            in_c = partial(measured, partial(scalar.vehicle_step, density=density))
+            yield from _against_c(step, density, in_c)
 
 
-def _against_c(step: Figure, ring: list[float | None]) -> Iterator[Figure]:
-    times = [value for value in ring if value is not None]
-    if not times:
+def _against_c(step: Figure, density: int, in_c: Callable[[], list[float]]) -> Iterator[Figure]:
+    if scalar.library() is None:
         print("there is no C compiler: not compared with C")
         return
-    scalar = Figure("c_step_ns", "vehicle-step of a ring road in C", times, "ns")
-    yield scalar
-    yield step.over(scalar, "c_ratio", "ours / in C", -0.6)
+    theirs = Figure(f"c_{density}_ns", f"vehicle-step in scalar C, {density}", in_c(), "ns")
+    yield theirs
+    yield step.over(theirs, f"c_{density}_ratio", f"ours / scalar C, {density}", -0.6)
 
 
 def _starts(runs: int) -> Iterator[Figure]:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import sys
 from typing import Annotated
 
 import typer
 
+from minisim.compiling import announce_if_new
 from minisim.version import __version__
 
 app = typer.Typer(
@@ -24,10 +26,16 @@ def _version(wanted: bool) -> None:
         raise typer.Exit
 
 
+#: These commands simulate in any case.
+_SIMULATING = ("animate", "demo", "optimum", "reproduce", "run", "sweep")
+
+
 @app.callback()
 def _root(
-    version: Annotated[
+    context: typer.Context,
+    version: Annotated[  # noqa: ARG001  # its callback has answered
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
     ] = False,
 ) -> None:
-    pass
+    if context.invoked_subcommand in _SIMULATING and not {"-h", "--help"} & set(sys.argv):
+        announce_if_new()

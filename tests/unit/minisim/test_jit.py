@@ -50,13 +50,14 @@ def ask(folder: Path, code: str = ASK) -> str:
 
 
 def copied(folder: Path) -> Path:
-    """A tree with the compiler's module alone, and a package of two modules that uses it."""
-    source = Path(minisim.jit.__file__)
+    """A tree with the modules of the compiler alone, and a package of two modules that uses it."""
+    source = Path(minisim.jit.__file__).parent
     (folder / "minisim").mkdir()
     (folder / "outside").mkdir()
     for package in ("minisim", "outside"):
         (folder / package / "__init__.py").write_text("")
-    shutil.copy(source, folder / "minisim" / "jit.py")
+    for name in ("compiling.py", "jit.py"):
+        shutil.copy(source / name, folder / "minisim" / name)
     (folder / "outside" / "caller.py").write_text(CALLER)
     return folder
 
