@@ -72,7 +72,8 @@ class MixedSession:
             mixed.dim, site, lambda v: not queue.is_human(v), lambda *views: courtesy(*views)
         )
         rules = self._dim.rules
-        courtesy = Courtesy(mixed.trust, readings, rules.table.matrix, queue)
+        exact = mixed.dim.perception.period is None
+        courtesy = Courtesy(mixed.trust, readings, rules.table.matrix, queue, exact)
         self._rules = rules, replace(rules, gate="harmonious")
         self._people = _People(mixed.humans, site, readings, queue)
         marks = dict.fromkeys((*self._dim.plan.marks, 0.0))  # at the entry another becomes first

@@ -68,8 +68,11 @@ class Courtesy:
     counts until it has left.
     """
 
-    def __init__(self, trust: str, readings: Readings, matrix: HarmonyMatrix, queue: Queue) -> None:
+    def __init__(
+        self, trust: str, readings: Readings, matrix: HarmonyMatrix, queue: Queue, exact: bool
+    ) -> None:
         self._trust, self._readings, self._queue = trust, readings, queue
+        self._exact = exact  # whether perception does not err
         self._conflict, self._movements = (~matrix.values).tolist(), matrix.movements
         self._turns = len(readings.turns) if matrix.types > 1 else 0  # rows of the matrix by type
         self._latest: tuple[View, View] | None = None  # what was seen last, and its interpretation
@@ -83,7 +86,7 @@ class Courtesy:
                 if self._queue.is_human(v)
             }
             there = list(self._there(seen, ways))
-            if seen is view and self._queue.humans:
+            if self._exact and self._queue.humans:
                 there = [v for v in there if v.distance >= 0.0 or self._blocks_any(v, there)]
             taken = tuple(self._known(v, ways.get(v.id, ())) for v in there)
             self._latest = seen, View(seen.time, taken)

@@ -16,7 +16,7 @@ KEPT = {
     "fair/5/dim:gate=harmonious/1": "ee74c8b9037de956",
     "fair/4/dim:monitor=on/1": "d94a2f41a4737c90",
     "fair/4/dim:perception=noisy(intent_error=0.15,kind=symmetric)/2": "814c130165be4ce4",
-    "fair/4/dim/1 humans=0.3": "eb17b7fc005c69f7",
+    "fair/4/dim/1 humans=0.3": "4b68170ebeeea4f2",
     "paper/4/fixed-time/1": "2ecea1096805f85d",
     "fair/4/fixed-time:facing=true/1": "96a599dd88fcc568",
     "fair/4/adaptive/2": "abc0c33341f21f73",

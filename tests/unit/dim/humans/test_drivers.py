@@ -108,3 +108,19 @@ def test_where_no_way_leads_straight_on_silence_says_nothing() -> None:
     drivers = Drivers(1.0, 1)
     silent = next(i for i in range(100) if drivers[0, i].careless < 0.25)
     assert read.possible(seen(silent, 1), "silence") == [0, 1]
+
+
+@pytest.mark.parametrize(
+    ("distance", "own", "blocks"),
+    [
+        (5.0, [1], True),  # before the junction, a2 and b2 conflict
+        (-3.0, [1], True),
+        (-13.0, [1], False),  # out of the way of a2, though not yet out of the junction
+        (-13.0, [0, 1, 2], True),  # but not of a3, which takes the same exit
+        (5.0, [0], False),
+        (2.0, [10], True),  # b2 might be b3, in the way of d2
+        (-9.0, [10], False),  # its place shows that it is not
+    ],
+)
+def test_what_is_in_the_way(distance: float, own: list[int], blocks: bool) -> None:
+    assert readings().blocks(seen(0, 2, distance, lane=1), own, "motion") is blocks

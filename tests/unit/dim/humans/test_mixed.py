@@ -145,6 +145,24 @@ def test_while_a_human_is_at_the_junction_the_gate_is_harmonious() -> None:
     assert Scene().goes(0.0, car, other, seen(PEOPLE[0], C, LEFT, 2.0)) == {CARS[0]}
 
 
+@pytest.mark.parametrize("noisy", [False, True])
+def test_dim_goes_as_soon_as_a_human_inside_is_out_of_the_way(noisy: bool) -> None:
+    """A driver at the same place goes then, too; where perception errs, DIM waits until it left."""
+    dim = Dim(perception=NoisyPerception(1e-9)) if noisy else Dim()
+    starts = {}
+    for first in (CARS[0], PEOPLE[0]):
+        scene, inside = Scene(replace(MIXED, dim=dim)), seen(PEOPLE[1], B, STRAIGHT, 2.0)
+        scene.goes(0.0, inside)
+        waiting = seen(first, A, STRAIGHT, 2.0)
+        scene.goes(0.1, inside, waiting)
+        places = np.arange(0.0, 22.0, 0.5)
+        entered = (inside._replace(distance=-float(p), speed=5.0) for p in places)
+        went = [first in scene.goes(2.5 + k, waiting, v) for k, v in enumerate(entered)]
+        starts[first] = went.index(True) if True in went else len(places)
+    assert 0 < starts[PEOPLE[0]] < len(places)
+    assert starts[CARS[0]] == (len(places) if noisy else starts[PEOPLE[0]])
+
+
 def test_what_the_host_has_to_provide() -> None:
     """DIM without its rest, and a mark at the entry."""
     alone, plan = MIXED.dim.start(SITE).plan, MIXED.start(SITE).plan
