@@ -6,17 +6,19 @@ and how many of them humans drive. Controllers come on top, and all have the sam
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from dim import Dim, ExactPerception
+from dim import Dim, ExactPerception, Perception
 from minisim.control import Controller
 from minisim.errors import InputError, choice, instance, integer
+from minisim.files import read_file
 from minisim.names import name_of
 from minisim.results.metric import Metric
 from minisim.results.metrics import METRICS
@@ -40,7 +42,7 @@ class Cell:
     """A row of the benchmark."""
 
     scenario: Scenario
-    perception: Any  # of vehicles that decide for themselves
+    perception: Perception  # of vehicles that decide for themselves
     humans: float  # share of vehicles that humans drive
 
     @property
@@ -115,9 +117,8 @@ def read_benchmark(path: str | os.PathLike[str] | None = None, *, quick: bool = 
     """
     path = standard_file() if path is None else Path(path)
     table = read_toml("the benchmark", path)
-    digest = digest_of(
-        json.dumps([table, *_demands(table, path.parent)], sort_keys=True, default=str)
-    )
+    said = json.dumps([table, *_files(table, path.parent)], sort_keys=True, default=str)
+    digest = digest_of(said)
     name, version = table.pop("name", ""), table.pop("version", None)
     shorter = table.pop("quick", {})
     try:
@@ -133,8 +134,7 @@ def read_benchmark(path: str | os.PathLike[str] | None = None, *, quick: bool = 
     recipes = experiments_of(table, path, shorter if quick else {})
     cells: dict[str, Cell] = {}
     for it in recipes:
-        perception = getattr(it.controller, "perception", ExactPerception())
-        cell = Cell(it.scenario, perception, it.humans)
+        cell = Cell(it.scenario, _perception_of(it, path), it.humans)
         if cells.setdefault(cell.name, cell) != cell:
             raise InputError(
                 f"{path}: two cells are called {cell.name!r}; give each scenario a label of its own"
@@ -143,11 +143,32 @@ def read_benchmark(path: str | os.PathLike[str] | None = None, *, quick: bool = 
     return Benchmark(name, version, digest[:16], quick, seeds, tuple(cells.values()))
 
 
-def _demands(table: dict[str, Any], folder: Path) -> Iterator[Any]:
-    """What the files of demand by time of day say that a definition names."""
-    for block in (table, *table.get("experiment", ())):
-        if isinstance(given := block.get("demand"), str):
-            yield read_toml("demand", folder / given)
+def _perception_of(recipe: Recipe, path: Path) -> Perception:
+    """What a block says about vehicles of DIM; `InputError` for what no cell has."""
+    for it in fields(Recipe):
+        own = it.name in ("scenario", "controller", "seed", "humans")
+        if not own and getattr(recipe, it.name) != it.default:
+            raise InputError(f"{path}: cells have no {it.name}; leave it out")
+    controller = recipe.controller
+    if not isinstance(controller, Dim) or controller != Dim(perception=controller.perception):
+        raise InputError(
+            f"{path}: the controller of a cell is dim, perhaps with a perception, got "
+            f"{name_of(controller)!r}; --controller says which take part"
+        )
+    return controller.perception
+
+
+def _files(table: Mapping[str, Any], folder: Path) -> Iterator[str]:
+    """A digest of each file that a definition names."""
+    blocks = table.get("experiment", [])
+    for block in (table, *(it for it in blocks if isinstance(it, dict))):
+        for key in ("scenario", "demand", "arrivals"):
+            given = block.get(key)
+            for value in given if isinstance(given, list) else [given]:
+                name = value.get("name") if isinstance(value, dict) else value
+                if isinstance(name, str) and os.path.isfile(folder / name):
+                    text = read_file(key, folder / name).replace(b"\r\n", b"\n")
+                    yield hashlib.sha256(text).hexdigest()
 
 
 def entrants(

@@ -16,7 +16,7 @@ from scenarios.benchmark.definition import (
 from scenarios.controllers import safe
 
 #: Version -> digest. A changed definition is another benchmark: raise its version.
-DIGESTS = {1: "1ba616220c9edb73"}
+DIGESTS = {1: "49b37e409dc9dffc"}
 
 HEAD = 'name = "ours"\nversion = 2\nseeds = [3, 5]\nhorizon = 60\n'
 
@@ -32,7 +32,7 @@ def test_the_definition_is_that_of_its_version() -> None:
     assert (made.name, made.digest) == ("minisim", DIGESTS[made.version])
 
 
-def test_what_the_demand_files_say_belongs_to_the_definition(tmp_path: Path) -> None:
+def test_what_its_files_say_belongs_to_the_definition(tmp_path: Path) -> None:
     for file in standard_file().parent.glob("benchmark*.toml"):
         shutil.copy(file, tmp_path)
     peak = tmp_path / "benchmark_peak.toml"
@@ -91,6 +91,12 @@ def test_all_runs_of_a_seed_have_the_same_arrivals() -> None:
         ("version = 1\n", "the benchmark has no name"),
         ('name = "x"\nversion = 0\n', "version of the benchmark must be an integer"),
         ('name = "x"\nversion = 1\nquick = 3\n', r"\[quick\] must be a dict, got 3"),
+        (HEAD + "[experiment]\ndensity = 3\n", "with two brackets"),
+        (HEAD + 'demand = "nowhere.toml"\n', "nowhere.toml: No such file"),
+        (HEAD + 'metrics = ["stops"]\n', "cells have no metrics; leave it out"),
+        (HEAD + 'on_collision = "record"\n', "cells have no on_collision"),
+        (HEAD + 'controller = "reservation"\n', "a cell is dim, .* got 'reservation'"),
+        (HEAD + 'controller = "dim:gate=harmonious"\n', "got 'dim:gate=harmonious'"),
         (HEAD + "[quick]\nsedes = 3\n", r"unknown key of \[quick\] 'sedes'.*mean 'seeds'"),
         (HEAD + "sedes = 3\n", "unknown key 'sedes'.*did you mean 'seeds'"),
         (HEAD + 'controller = "dimm"\n', "did you mean 'dim'"),
