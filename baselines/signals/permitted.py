@@ -115,7 +115,8 @@ class PermittedHeads(Heads):
         for lane in lanes:
             if self._partners[lane]:
                 commands += self._keep_clear(lane, lanes)
-        waiting = any(self._waits[self._way(v)] for v in here)
+        # A vehicle clears the junction unnoticed: it stays in view.
+        waiting = self.colours != list(wanted) or any(self._waits[self._way(v)] for v in here)
         self.next_look = view.time + self._look if waiting else math.inf
         return commands
 

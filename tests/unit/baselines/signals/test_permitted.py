@@ -138,6 +138,16 @@ def test_at_the_end_of_green_vehicles_that_can_stop_are_held() -> None:
     ]
 
 
+def test_it_looks_until_the_way_of_a_head_that_should_be_green_is_clear() -> None:
+    it = heads()
+    told(it, car(1, "a2", 5.0, LIMIT))
+    assert told(it, car(1, "a2", -12.0, LIMIT), time=11.0, wanted=ACROSS) == []
+    assert it.next_look == pytest.approx(11.2)
+    told(it, car(1, "a2", -19.5, LIMIT), time=11.2, wanted=ACROSS)
+    assert it.colours == list(ACROSS)
+    assert it.next_look == math.inf
+
+
 def test_a_vehicle_behind_the_junction_keeps_no_head_red() -> None:
     it = heads()
     assert told(it, car(1, "a3", -22.0, 7.0), car(4, "b2", 0.25), wanted=ACROSS) == ["Go 4"]
