@@ -369,7 +369,7 @@ class Plan:
     reach: float = real(
         "a view keeps a vehicle until its front is this far past the junction entry, even after "
         "its rear has left the junction",
-        "m", default=0.0, low=0, high=1000,
+        "m", default=0.0, low=0,
     )  # fmt: skip
     lanes_open: Switch = switch("lanes start open; otherwise vehicles are held", default=False)
 

@@ -57,8 +57,9 @@ def is_maker(kind: type) -> bool:
 
 def _controllers(module: ModuleType) -> list[str]:
     """Those that the module or its parts define, not what it imports from elsewhere."""
+    names = getattr(module, "__all__", vars(module))  # a package may load them on first use
     return [
-        key for key, value in vars(module).items()
+        key for key, value in ((name, getattr(module, name, None)) for name in names)
         if isinstance(value, type) and is_maker(value) and not key.startswith("_")
         and f"{value.__module__}.".startswith(f"{module.__name__}.")
     ]  # fmt: skip

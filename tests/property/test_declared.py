@@ -13,6 +13,7 @@ import pkgutil
 import re
 from collections.abc import Iterator
 from dataclasses import MISSING
+from inspect import isabstract
 from typing import Any
 
 import pytest
@@ -51,7 +52,7 @@ def declarations() -> dict[str, tuple[type, Declared]]:
         f"{kind.__name__}.{declared.name}": (kind, declared)
         for module in modules()
         for kind in vars(module).values()
-        if isinstance(kind, type) and kind.__module__ == module.__name__
+        if isinstance(kind, type) and kind.__module__ == module.__name__ and not isabstract(kind)
         for declared in parameters(kind)
     }
 

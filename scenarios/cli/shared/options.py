@@ -40,7 +40,7 @@ Density = Annotated[
 ]
 Split = Annotated[str | None, option("Shares of the lanes a, b, c, …", "4:3:2:1")]
 Turns = Annotated[str | None, option("Shares of the exits, clockwise.", "1:2:1")]
-Unit = Annotated[str | None, option("Of the inflow: veh, pcu, pcu-irc64, pcu-hcm.", "NAME")]
+Unit = Annotated[str | None, option("Of inflow: veh, pcu, pcu-irc64, pcu-hcm.", "NAME")]
 Fleet = Annotated[str | None, option("Vehicle types: india, car:0.9,bus:0.1, …", "MIX")]
 LaneWidth = Annotated[float | None, option("Width of every lane; 3.2 by default.", "M")]
 ProfileName = Annotated[

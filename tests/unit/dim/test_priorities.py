@@ -140,7 +140,8 @@ def test_late_vehicles_agree(reach: float, agree: bool, monkeypatch: pytest.Monk
             self.watches: dict[int, PassingTimes] = {}
 
         def ranks(self, view: View, watcher: int) -> tuple[int, ...]:
-            since = self.watches.setdefault(watcher, PassingTimes(start)).look(*view)
+            watch = self.watches.setdefault(watcher, PassingTimes(start))
+            since = watch.look(view.time, view.vehicles)
             return longest_waiting(view.time, 4, since, self.memory).ranks
 
         def decide(self, view: View) -> Iterable[Command]:
