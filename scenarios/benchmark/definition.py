@@ -34,7 +34,7 @@ from scenarios.sweep.keys import digest_of
 MEASURED: tuple[str | Metric, ...] = (*METRICS, DELAY, LEAST, ABOVE)
 
 #: Knows all arrivals beforehand: shown, but not ranked.
-SCHEDULE = "schedule"
+SCHEDULE = Clairvoyant.name
 
 
 @dataclass(frozen=True)

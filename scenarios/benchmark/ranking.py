@@ -18,16 +18,18 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from scenarios.benchmark.definition import SCHEDULE
+from scenarios.optimum import DELAY
+from scenarios.optimum import LEAST as LEAST_DELAY
 from scenarios.statistics import CONFIDENCE, Interval, mean_interval
 
 if TYPE_CHECKING:
     import pandas as pd
 
 #: The measure by which controllers are ranked: the smaller, the better.
-RANKED = "delay_s"
+RANKED = DELAY.name
 
 #: What the least possible is.
-LEAST = "least_delay_s"
+LEAST = LEAST_DELAY.name
 
 #: Value of a controller by seed.
 Values = Mapping[int, float]

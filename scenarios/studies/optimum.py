@@ -13,7 +13,7 @@ from scenarios.recipe import Recipe
 from scenarios.studies.shared.study import Study
 
 #: Knows all arrivals beforehand, so it is no rival, and shows how tight the bound is.
-SCHEDULE = "schedule"
+SCHEDULE = Clairvoyant.name
 
 #: From free flow to the highest demand of the paper [veh/h/lane].
 DENSITIES = (50.0, 150.0, 250.0, 350.0)

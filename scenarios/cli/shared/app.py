@@ -27,7 +27,9 @@ def _version(wanted: bool) -> None:
 
 
 #: These commands simulate in any case.
-_SIMULATING = ("animate", "demo", "optimum", "reproduce", "run", "sweep")
+_SIMULATING = (
+    "animate", "benchmark", "crossval", "demo", "optimum", "reproduce", "run", "sweep",
+)  # fmt: skip
 
 
 @app.callback()
