@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import replace
+from functools import reduce
+from operator import or_
 from functools import cache
 
 import pytest
@@ -101,11 +103,11 @@ def test_with_the_stoppable_rule_all_vehicles_that_go_are_in_harmony() -> None:
     for gate in GATES:
         protocol = Protocol(paper(3), gate=gate)
         for state in states_of(protocol):
-            going = state.inside
+            after = State((None,) * 3, state.inside, passed=state.passed)
             for lane, front in enumerate(state.fronts):
                 if front is not None and front.goes:
-                    going |= 1 << lane * 2 + front.manoeuvre - 1
-            assert protocol.conflict(State((None,) * 3, going)) is None
+                    after = protocol.entered(after, lane, front.manoeuvre)
+            assert protocol.conflict(after) is None
 
 
 def agents_say(protocol: Protocol, state: State, table: DecisionTable) -> list[bool]:
@@ -119,7 +121,8 @@ def agents_say(protocol: Protocol, state: State, table: DecisionTable) -> list[b
         participants=tuple(lane for lane, _ in participants),
         crossing=tuple(lane for lane, _ in crossing) + tuple(100 + k for k in inside),
         case=sum(f.manoeuvre * n**lane for lane, f in participants),
-        occupied=state.inside | sum(1 << lane * (n - 1) + f.manoeuvre - 1 for lane, f in crossing),
+        occupied=sum(1 << lane * (n - 1) + f.manoeuvre - 1 for lane, f in crossing),
+        barred=reduce(or_, (protocol.in_way(state, k) for k in inside), 0),
     )
     answers = []
     for lane, front in present:
