@@ -66,7 +66,8 @@ def _priorities(title: str, value: Any) -> Any:
 class Dim:
     """Vehicles that decide alone, by the paper's rules or ours.
 
-    The gates "harmonious" and "passed", priorities other than the lanes' own order, and the monitor are ours.
+    The gates "harmonious" and "passed", priorities other than the lanes' own order, and the
+    monitor are ours.
     """
 
     name = Name("dim")

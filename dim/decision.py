@@ -106,9 +106,10 @@ class DecisionTable:
         admitted: (case, crossing, barred) -> the case without the participants that conflict with
             any movement in `crossing` (bit k for the k-th), or whose own is in `barred` (default
             none). Movements of one lane follow each other and are not in conflict.
-        surely: (case, unknown, crossing, barred) -> of the lanes that are admitted, those that have the
-            right of way whatever the participants on the lanes in `unknown` do (bit i for lane
-            i; with types, Σ (1 + type)·(1 + types)^lane); the case leaves these participants out.
+        surely: (case, unknown, crossing, barred) -> of the lanes that are admitted, those that
+            have the right of way whatever the participants on the lanes in `unknown` do (bit i for
+            lane i; with types, Σ (1 + type)·(1 + types)^lane); the case leaves these participants
+            out.
 
     Raises `InputError`: unknown order, or priorities that are not a permutation of the lanes.
     """

@@ -142,16 +142,19 @@ class Protocol:
                     yield Event("slow", lane, manoeuvre), after
         for k, movement in enumerate(self.matrix.movements):
             if state.inside >> k & 1:
-                after = self._renewed(state, k)._replace(inside=state.inside ^ 1 << k)
-                yield Event("leave", *movement), after
+                yield Event("leave", *movement), self._left(state, k)
                 yield from self.passes(state, k)
 
     def passes(self, state: State, k: int) -> Iterator[Step]:
-        """All inside on a movement leave the way of a foe, in any order."""
-        m = len(self._foes)
-        ahead = self.in_way(state, k) if self.gate == "passed" else 0
-        for foe in range(m):
-            if ahead >> foe & 1:
+        """All inside on a movement leave the way of one that is at the front of its lane.
+
+        They may have done so before, but it only matters now; they leave ways in any order.
+        """
+        if self.gate != "passed":
+            return
+        rows, m, ahead = self._movements.rows, len(self._foes), self.in_way(state, k)
+        for lane, front in enumerate(state.fronts):
+            if front is not None and ahead >> (foe := rows[lane][front.manoeuvre]) & 1:
                 passed = state.passed | 1 << k * m + foe
                 yield Event("pass", *self._movements[k], foe), state._replace(passed=passed)
 
@@ -159,10 +162,14 @@ class Protocol:
         """The movements, as bits, in whose way those inside on a movement still are."""
         return self._foes[k] & ~(state.passed >> k * len(self._foes))
 
-    def _renewed(self, state: State, k: int) -> State:
-        """With none on a movement that has passed: the last one has left, or another enters."""
-        m = len(self._foes)
-        return state._replace(passed=state.passed & ~((1 << m) - 1 << k * m))
+    def _left(self, state: State, k: int) -> State:
+        """The last vehicle on a movement has left: what it passed, and what passed it, is over."""
+        m, (lane, manoeuvre) = len(self._foes), self._movements[k]
+        over = (1 << m) - 1 << k * m
+        front = state.fronts[lane]
+        if front is None or front.manoeuvre != manoeuvre:
+            over |= sum(1 << foe * m + k for foe in range(m))
+        return state._replace(inside=state.inside ^ 1 << k, passed=state.passed & ~over)
 
     def look(self, state: State) -> State:
         """All vehicles decide (Algorithm 1, lines 4 to 12).
@@ -208,8 +215,9 @@ class Protocol:
     def entered(self, state: State, lane: int, manoeuvre: int) -> State:
         """The state after the front vehicle of a lane has entered."""
         after = self._put(state, lane, None)
-        after = self._renewed(after, self._movements.rows[lane][manoeuvre])
+        m, k = len(self._foes), self._movements.rows[lane][manoeuvre]
         return after._replace(
+            passed=state.passed & ~((1 << m) - 1 << k * m),
             inside=state.inside | self._movements.bits[lane][manoeuvre],
             came=tuple(other for other in state.came if other != lane),
         )

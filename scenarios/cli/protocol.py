@@ -44,8 +44,8 @@ def protocol(
         str,
         typer.Option(
             metavar="clear|harmonious|passed",
-            help="Which vehicles may enter while others cross: none, those in harmony, or also those "
-            "in whose way none is any more.",
+            help="Which vehicles may enter while others cross: none, those in harmony, or "
+            "also those in whose way none is any more.",
         ),
     ] = "clear",
     order: options.Order = "size",
