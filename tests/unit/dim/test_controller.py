@@ -60,7 +60,7 @@ def test_under_the_gate_passed_it_enters_once_the_one_inside_is_out_of_its_way()
     for gate in GATES:
         scene = Scene(Dim(gate=gate))
         b = car(2, "b2", -4.0, 5.0)
-        assert scene.show(b._replace(distance=2.2)) == "Go 2"
+        assert scene.show(car(2, "b2", 2.2)) == "Go 2"
         waits = scene.show(b, car(3, "c2", 2.2))
         assert waits.startswith("Wake") == (gate == "passed")
         goes = scene.show(b._replace(distance=-14.0), car(3, "c2", 2.2))
