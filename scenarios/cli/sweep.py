@@ -78,7 +78,7 @@ def sweep(
     jobs: options.Jobs = None,
     scheduler: Annotated[
         str | None,
-        option("Run on this Dask cluster (pip install 'minisim-traffic\\[dask]').", "ADDRESS"),
+        option("Run on a Dask cluster (pip install 'minisim-traffic\\[dask]').", "ADDRESS"),
     ] = None,
     export: Annotated[Path | None, option("One row per run (.csv or .parquet).", "FILE")] = None,
     horizon: Annotated[float | None, option("Simulated time; the file's, or 3600.", "S")] = None,
