@@ -83,12 +83,13 @@ def test_every_extra_that_a_message_or_a_page_names_exists() -> None:
     assert [need for need in own if need.startswith("minisim[")] == []
 
 
-def test_the_citation_is_valid() -> None:
-    """By the schema of CITATION.cff 1.2.0, and of the version that is here."""
+def test_the_citation_has_what_its_schema_requires() -> None:
+    """CITATION.cff 1.2.0 requires four keys; the version is the one that is here."""
     text = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    keys = re.findall(r"^([a-z-]+):", text, re.MULTILINE)
+    assert {"cff-version", "message", "title", "authors"} <= set(keys)
+    assert len(keys) == len(set(keys))
     assert f"\nversion: {__version__}\n" in text
-    cff = pytest.importorskip("cffconvert", reason="needs cffconvert")
-    cff.Citation(text).validate()
 
 
 @pytest.mark.slow
