@@ -63,7 +63,7 @@ def test_under_the_gate_passed_it_enters_once_the_one_inside_is_out_of_its_way()
         assert scene.show(car(2, "b2", 2.2)) == "Go 2"
         waits = scene.show(b, car(3, "c2", 2.2))
         assert waits.startswith("Wake") == (gate == "passed")
-        goes = scene.show(b._replace(distance=-14.0), car(3, "c2", 2.2))
+        goes = scene.show(b._replace(distance=-15.5), car(3, "c2", 2.2))
         assert goes == ("Go 3" if gate == "passed" else "")
 
 
