@@ -148,7 +148,7 @@ class _People:
         if not self._is_ready(me, now):
             return Reason("reaction", me.id, until=self._ready_at(me))
         blocking = self._in_the_way(me, there)
-        return Reason("gap too short" if blocking else "looks again", me.id, blocking)
+        return Reason("others first" if blocking else "looks again", me.id, blocking)
 
     def _is_ready(self, vehicle: Observed, now: float) -> bool:
         """Whether the reaction and follow-up times are over, to within half a step."""

@@ -98,3 +98,6 @@ def test_the_command_answers_for_the_run_that_run_makes(capsys: pytest.CaptureFi
     assert json.loads(capsys.readouterr().out)["reasons"][0]["sentence"] == said[0]
     assert main(["why", *given, "--vehicle", "9999", "--at", "150"]) == 2
     assert "vehicle must be an integer 0 …" in capsys.readouterr().err
+    for at in ("-1", "201"):
+        assert main(["why", *given, "--vehicle", "26", f"--at={at}"]) == 2
+        assert "--at [s] must be at least 0 and at most 200" in capsys.readouterr().err
