@@ -519,11 +519,32 @@ class Unregulated:
 
     def start(self, site: Site) -> Session:  # noqa: ARG002  (Controller's argument)
         """Open every lane, for good."""
-        return _UnregulatedSession()
+        return _Silent(Plan(lanes_open=True))
 
 
-class _UnregulatedSession:
-    plan = Plan(lanes_open=True)
+@dataclass(frozen=True)
+class External:
+    """Decides nothing itself: all commands come from outside (`Simulation.command`).
+
+    `plan` says when `Simulation.run_until("wake")` returns and what `Simulation.view` shows.
+    """
+
+    plan: Plan = Plan()  # noqa: RUF009  (frozen)
+
+    name = Name("external")
+    covers = NOTHING
+
+    def __post_init__(self) -> None:
+        instance("plan", self.plan, Plan)
+
+    def start(self, site: Site) -> Session:  # noqa: ARG002  (Controller's argument)
+        """Begin a run in which every vehicle is held until a command lets it go."""
+        return _Silent(self.plan)
+
+
+@dataclass(frozen=True)
+class _Silent:
+    plan: Plan
 
     def decide(self, view: View) -> tuple[Command, ...]:  # noqa: ARG002  (Session's argument)
         return ()
