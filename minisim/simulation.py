@@ -184,7 +184,8 @@ class Simulation:
         """A copy that goes on by itself: left alone, both give identical trips.
 
         It shares what no run changes (scenario, controller, site, arrivals) and copies the rest,
-        the session with its random streams included.
+        the session with its random streams included. What a session keeps must be in attributes: a
+        closure or a generator cannot be copied.
         """
         hosted = self._hosted
         shared = (hosted.scenario, hosted.controller, hosted.arrivals, hosted.plan)
