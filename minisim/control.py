@@ -222,6 +222,10 @@ class Report(NamedTuple):
     holds: bool  # whether the vehicle then had the right of way
 
 
+#: If no message fails.
+NO_REPORTS: Mapping[int, Report] = MappingProxyType({})
+
+
 class View(NamedTuple):
     """What the session is shown at a wake-up.
 
@@ -234,7 +238,7 @@ class View(NamedTuple):
 
     time: float  # [s]
     vehicles: tuple[Observed, ...]  # by lane, then front to back
-    reports: Mapping[int, Report] = MappingProxyType({})  # by vehicle; empty if no message fails
+    reports: Mapping[int, Report] = NO_REPORTS  # by vehicle; empty if no message fails
 
 
 @dataclass(frozen=True, slots=True)

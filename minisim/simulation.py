@@ -10,6 +10,7 @@ from functools import partial
 import numpy as np
 
 from minisim.control import (
+    NO_REPORTS,
     Advise,
     Brake,
     Close,
@@ -188,8 +189,10 @@ class Simulation:
         closure or a generator cannot be copied.
         """
         hosted = self._hosted
-        shared = (hosted.scenario, hosted.controller, hosted.arrivals, hosted.plan)
-        shared = (*shared, self.site, self._layout, self._law)
+        shared = (
+            hosted.scenario, hosted.controller, hosted.arrivals, hosted.plan,
+            self.site, self._layout, self._law, NO_REPORTS,
+        )  # fmt: skip
         return deepcopy(self, {id(it): it for it in shared})
 
     def _begin(self) -> bool:

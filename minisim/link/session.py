@@ -107,6 +107,8 @@ class Link:
 
     def __getattr__(self, name: str) -> Any:
         """Whatever else the session has, such as `kind`."""
+        if name.startswith("_"):  # a copy has no session yet when it is asked for its methods
+            raise AttributeError(name)
         return getattr(self._session, name)
 
     @property

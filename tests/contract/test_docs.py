@@ -68,7 +68,7 @@ def test_its_mapping_is_one(tmp_path: Path) -> None:
 
 
 def test_a_search_looks_ahead(capsys: pytest.CaptureFixture[str]) -> None:
-    """The examples in docs/stepping.md: DIM from outside, and a tree search that serves vehicles."""
+    """The examples in docs/stepping.md: DIM from outside, and a tree search."""
     outside, search = blocks("docs/stepping.md")
     made: dict[str, Any] = {}
     exec(compile(outside, "docs/stepping.md", "exec"), made)

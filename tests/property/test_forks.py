@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -45,10 +47,11 @@ def forks_go_on_alike(scenario: Scenario, controller: Controller, seed: int, tim
     assert digest(whole) == kept
 
 
-@settings(max_examples=12)
-@given(scenarios(), controllers(), st.integers(0, 2**32 - 1), st.floats(0.0, 60.0))
+@settings(max_examples=5)
+@given(scenarios(), controllers(), st.integers(0, 2**32 - 1), st.floats(0.0, 40.0))
 def test_random_runs(scenario: Scenario, controller: Controller, seed: int, time: float) -> None:
-    forks_go_on_alike(scenario, controller, seed, time)
+    short = dataclasses.replace(scenario, horizon=60.0, warmup=0.0)
+    forks_go_on_alike(short, controller, seed, time)
 
 
 @pytest.mark.parametrize("name", FORKED)
