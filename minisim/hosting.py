@@ -130,9 +130,7 @@ class Hosted:
             self.exchange["shown"] += len(view.vehicles)
             if 0.0 < view.time <= self.scenario.warmup and keeps(self.session, Counting):
                 self.before.update(self.session.counts)
-            for command in commands:
-                check_command(command, tick, self.site, len(self.arrivals))
-                self.exchange[type(command).__name__] += 1
+            self.take(commands, tick)
             if view.time < self.scenario.warmup:
                 self.exchange.clear()
                 self.times.clear()
@@ -151,6 +149,16 @@ class Hosted:
         except (Exception, SystemExit) as error:  # a caller's code may raise anything
             session = self.session
             raise _blame(self.controller, error, session, f" at {view.time:.1f} s") from error
+
+    def take(self, commands: Sequence[Command], tick: int) -> None:
+        """Check commands and count them; raises `InputError` for one that cannot be carried out."""
+        for command in commands:
+            check_command(command, tick, self.site, len(self.arrivals))
+        if time_of(tick, self.site.dt) >= self.scenario.warmup:
+            for command in commands:
+                self.exchange[type(command).__name__] += 1
+        if self.witness is not None:
+            self.witness.note(commands)
 
     def collided(self, these: Sequence[Collision], replay: Callable[..., Run]) -> CollisionError:
         """The error that stops the run, with a `replay` that records what led to it."""
