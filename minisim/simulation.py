@@ -67,6 +67,8 @@ class Simulation:
             "teleport", for a `CruiseVehicle` only, also lets a vehicle closer than `min_gap` to
             the one ahead on its exit arrive, as SUMO did in the published runs.
         timed: keep the CPU time of each decision (`Run.decision_times`).
+        explain: write down at each step why each vehicle in view waits or goes (`Run.reasons`), and
+            what signal heads show (`Run.heads`). The trips stay the same.
 
     Raises:
         InputError: a value that is not allowed, or a scenario that the controller cannot serve.
@@ -82,10 +84,11 @@ class Simulation:
         record_window: tuple[float, float] = (0.0, math.inf),
         on_collision: str = "stop",
         timed: bool = False,
+        explain: bool = False,
     ) -> None:
         self._hosted = hosted = begin(
             scenario, controller, seed, record=record, record_window=record_window,
-            on_collision=on_collision, reactions=REACTIONS, timed=timed,
+            on_collision=on_collision, reactions=REACTIONS, timed=timed, explain=explain,
         )  # fmt: skip
         self.site, plan = hosted.site, hosted.plan
         teleports = on_collision == "teleport"
@@ -107,6 +110,7 @@ class Simulation:
         self._collisions: dict[tuple[int, int], Collision] = {}
         self._horizon_tick = first_tick(scenario.horizon, self.site.dt)
         self._alarm = Alarm(plan.period, self.site.dt)
+        self._stride = 1 if explain else NEVER  # most steps between two looks for reasons
         self._given: list[tuple[int, tuple[Command, ...]]] = []  # commands from outside, by tick
         self._started = False
         self._done = False
@@ -214,7 +218,7 @@ class Simulation:
             kernel.advance, self._cruise is None, (*world, *scratch, self._traced, self.tick, 0)
         )
         while self.tick < target and not self._done:
-            end = min(target, self._alarm.tick, self.tick + most)
+            end = min(target, self._alarm.tick, self.tick + min(self._stride, most))
             self.tick, reasons, self._traced, self._seen = step(
                 *world, *scratch, self._traced, self.tick, end
             )
@@ -226,6 +230,8 @@ class Simulation:
             woken = self.tick >= self._alarm.tick or bool(reasons & (MARKED | CLEAR))
             if woken:
                 self._decide()
+            elif self._hosted.witness is not None:
+                self._hosted.look(self.view())
             yield woken
 
     def run(self) -> Run:
@@ -320,6 +326,7 @@ def simulate(
     record_window: tuple[float, float] = (0.0, math.inf),
     on_collision: str = "stop",
     timed: bool = False,
+    explain: bool = False,
 ) -> Run:
     """Run a scenario under a controller; see `Simulation` for the arguments and errors.
 
@@ -337,4 +344,5 @@ def simulate(
         record_window=record_window,
         on_collision=on_collision,
         timed=timed,
+        explain=explain,
     ).run()

@@ -24,14 +24,14 @@ from typing import Any, ClassVar, Final, NoReturn
 import numpy as np
 import pandas as pd
 
-from minisim.errors import FileError, InputError, MissingExtraError, instance, show
+from minisim.errors import FileError, InputError, MissingExtraError, extra, instance, show
 from minisim.files import read_file, replacing
 from minisim.results.run import Run
 from minisim.results.trips import TRIP_ARRAYS, Trips
 
 #: The type of file, and the layout that this version writes.
 MARK: Final = "minisim run"
-LAYOUT: Final = 3
+LAYOUT: Final = 4
 
 #: Packages whose classes are written as class and fields.
 PACKAGES: Final = ("minisim", "dim", "baselines", "scenarios")
@@ -39,7 +39,7 @@ PACKAGES: Final = ("minisim", "dim", "baselines", "scenarios")
 #: The fields of a run that hold plain values.
 _VALUES: Final = (
     "seed", "site", "plan", "collisions", "record", "record_window", "counts", "exchange",
-    "host", "environment",
+    "host", "environment", "reasons", "heads",
 )  # fmt: skip
 
 
@@ -233,7 +233,7 @@ def _written_or(value: Any, stand_in: type[_StandIn]) -> Any:
 
 def _need_pyarrow() -> None:
     if importlib.util.find_spec("pyarrow") is None:
-        raise MissingExtraError("saved runs need pyarrow: pip install 'minisim[parquet]'")
+        raise MissingExtraError(f"saved runs need pyarrow: {extra('parquet')}")
 
 
 def _digest(data: bytes) -> bytes:

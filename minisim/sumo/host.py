@@ -20,7 +20,15 @@ from typing import IO, NamedTuple
 from minisim.control import Command, Controller, View
 from minisim.engine.cruise.law import build_cruise
 from minisim.engine.state import build_layout, build_vehicles
-from minisim.errors import FileError, InputError, MissingExtraError, SumoError, choice, instance
+from minisim.errors import (
+    FileError,
+    InputError,
+    MissingExtraError,
+    SumoError,
+    choice,
+    extra,
+    instance,
+)
 from minisim.files import replacing
 from minisim.hosting import AFTERMATH, REACTIONS, Hosted, begin
 from minisim.laws import build_law
@@ -37,8 +45,6 @@ MODELS = tuple(model.sumo for model in CAR_FOLLOWING.values() if model.sumo)
 
 #: What the child writes on stderr.
 STDERR = "stderr.txt"
-
-INSTALL = "pip install 'minisim[sumo]'"
 
 #: What the child runs. The classes of its messages must belong to the module, not to `__main__`.
 CHILD = "from minisim.sumo.worker import main; main()"
@@ -57,6 +63,7 @@ def simulate(
     record_window: tuple[float, float] = (0.0, math.inf),
     on_collision: str = "stop",
     timed: bool = False,
+    explain: bool = False,
     keep_files: str | os.PathLike[str] | None = None,
     fcd: str | os.PathLike[str] | None = None,
     gui: bool = False,
@@ -81,6 +88,8 @@ def simulate(
             ahead or waits for 300 s is moved to the next road, or counts as arrived if there is
             none. Touching inside the junction does not count.
         timed: keep the CPU time of each decision (`Run.decision_times`).
+        explain: write down at each wake-up why each vehicle in view waits or goes (`Run.reasons`),
+            and what signal heads show (`Run.heads`).
         keep_files: new or empty folder for SUMO's files, which are temporary by default: network,
             routes, configuration, log and trips. If the run fails, they stay, and the exception
             has a note that names the folder.
@@ -102,7 +111,7 @@ def simulate(
         _check_display()
     hosted = begin(
         scenario, controller, seed, record=record, record_window=record_window,
-        on_collision=on_collision, reactions=REACTIONS, timed=timed,
+        on_collision=on_collision, reactions=REACTIONS, timed=timed, explain=explain,
     )  # fmt: skip
     return _run(hosted, _Options(home, model, keep_files, fcd, gui, progress))
 
@@ -155,7 +164,7 @@ def sumo_home() -> Path:
         found = importlib.util.find_spec(package)
         origin = found and found.origin
         if origin is None:
-            raise MissingExtraError(f"the host SUMO needs the package {package}: {INSTALL}")
+            raise MissingExtraError(f"the host SUMO needs the package {package}: {extra('sumo')}")
     return Path(str(origin)).parent  # importing it would change the environment
 
 
