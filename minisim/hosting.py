@@ -135,20 +135,10 @@ class Hosted:
                 self.exchange.clear()
                 self.times.clear()
             if self.witness is not None:
-                self.witness.note(commands)
                 self.witness.look(view)
         except (Exception, SystemExit) as error:  # a caller's code may raise anything
             raise _blame(self.controller, error, self.session, f" at {view.time:.1f} s") from error
         return commands
-
-    def look(self, view: View) -> None:
-        """Write down the reasons at the time of a view; `ControllerError` as `ask` raises."""
-        try:
-            if self.witness is not None:
-                self.witness.look(view)
-        except (Exception, SystemExit) as error:  # a caller's code may raise anything
-            session = self.session
-            raise _blame(self.controller, error, session, f" at {view.time:.1f} s") from error
 
     def take(self, commands: Sequence[Command], tick: int) -> None:
         """Check commands and count them; raises `InputError` for one that cannot be carried out."""
@@ -159,6 +149,15 @@ class Hosted:
                 self.exchange[type(command).__name__] += 1
         if self.witness is not None:
             self.witness.note(commands)
+
+    def look(self, view: View) -> None:
+        """Write down the reasons at the time of a view; `ControllerError` as `ask` raises."""
+        try:
+            if self.witness is not None:
+                self.witness.look(view)
+        except (Exception, SystemExit) as error:  # a caller's code may raise anything
+            session = self.session
+            raise _blame(self.controller, error, session, f" at {view.time:.1f} s") from error
 
     def collided(self, these: Sequence[Collision], replay: Callable[..., Run]) -> CollisionError:
         """The error that stops the run, with a `replay` that records what led to it."""
