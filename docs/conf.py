@@ -22,7 +22,7 @@ default_role = "code"  # docstrings put code between single backticks
 autodoc_typehints = "none"  # they are in the signatures
 myst_enable_extensions = ["dollarmath", "deflist"]
 myst_heading_anchors = 4
-nb_execution_mode = "cache"
+nb_execution_mode = "force"  # what a lesson prints is that of the present code
 nb_execution_raise_on_error = True
 nb_execution_timeout = 120
 
