@@ -15,6 +15,7 @@ from minisim.control import HALTING, Command, Go, Observed, Plan, Site, View, Wa
 from minisim.junction.conflicts import clearing_distances
 from minisim.names import Name
 from minisim.parameters import declared, real
+from minisim.reasons import Reason
 
 #: A vehicle stands at the line when its front is at most this far before it [m].
 LINE = 1.0
@@ -92,6 +93,33 @@ class AllWayStopSession:
                 looks.append(ready)
         look = max(min(looks, default=math.inf), view.time + self._dt)
         return commands if math.isinf(look) else [*commands, Wake(look)]
+
+    def reasons(self, view: View) -> dict[int, Reason]:
+        """Why the first vehicles of the lanes wait (`minisim.reasons.Explaining`)."""
+        found = {}
+        crossing = [v for v in view.vehicles if v.id in self._gone or v.distance < 0.0]
+        for me in self._heads(view):
+            if me.id not in self._standing:
+                found[me.id] = Reason("approaching", me.id)
+            elif view.time + self._dt / 2.0 < (ready := self._standing[me.id] + self._reaction):
+                found[me.id] = Reason("reaction", me.id, until=ready)
+            else:
+                found[me.id] = self._turn(me, view, crossing)
+        return found
+
+    def _turn(self, me: Observed, view: View, crossing: list[Observed]) -> Reason:
+        """Why a vehicle that has stood long enough still waits."""
+        since, own = self._standing, self._index(me)
+        clearing = self._clearing
+        key = since[me.id], me.lane
+        earlier = [v for v in self._heads(view) if v.id in since and (since[v.id], v.lane) < key]
+        first = [v.id for v in earlier if clearing[v.type][own][self._index(v)] > 0.0]
+        if first:
+            return Reason("turn", me.id, tuple(first))
+        inside = [
+            v.id for v in crossing if clearing[v.type][own][self._index(v)] + v.distance > 0.0
+        ]
+        return Reason("clearing" if inside else "looks again", me.id, tuple(inside))
 
     def _heads(self, view: View) -> list[Observed]:
         """The first vehicle of each lane that has not been let go, if it is at the line."""

@@ -35,6 +35,7 @@ from dim.harmony import HarmonyMatrix
 from dim.monitor import Monitor
 from dim.perception import COMMITS, ROUNDING, ExactPerception, Perception, Reader
 from dim.priorities import CHANGING, SENSOR_RANGE, TURN_TIME, ranking_of, rotating
+from dim.reasons import Reasons, reasons_of
 from dim.senses.noise import NoisyPerception
 from dim.senses.tally import Tally
 from dim.zones import Zones
@@ -42,6 +43,7 @@ from minisim.control import Command, Go, Hold, Observed, Plan, Site, View, Wake
 from minisim.errors import InputError, choice, instance, items
 from minisim.names import Name
 from minisim.parameters import Spelled, Takes, checked, declared, part, real, refuse_idle, word
+from minisim.reasons import Reason
 
 _Word: TypeAlias = Literal["inflow", "rotating", "waiting"]
 
@@ -223,7 +225,10 @@ class DimSession:
         self._monitors = dim.monitor.start(site, matrix, self._start) if dim.monitor else None
         self._dt, self._follows, self._takes = site.dt, follows, takes
         self._agents: dict[int, Agent] = {}
+        self._sights: dict[int, View] = {}  # what each of them saw when it last looked
+        self._table = table
         exact = looks is None
+        self._same = exact and takes is None  # whether all see the true view
         self._tally = None if exact else Tally(self.reader, self._start)
 
     @property
@@ -258,7 +263,7 @@ class DimSession:
             if not goes:
                 look_again |= vehicle in percept.crossing
                 waiting |= vehicle in percept.participants
-        self._agents = agents
+        self._agents, self._sights, self._table = agents, sights, table
         going = {vehicle for vehicle, agent in agents.items() if agent.right_of_way}
         if self._monitors is not None:
             commands += self._monitors.look(view, sights, going)
@@ -271,6 +276,26 @@ class DimSession:
         elif waiting and until < math.inf:
             commands.append(Wake(max(until, view.time + self._dt)))
         return commands
+
+    def reasons(self, view: View) -> Mapping[int, Reason]:
+        """Why the vehicles in view wait or go (`minisim.reasons.Explaining`).
+
+        If all see the same, each says what it sees now; else what it saw when it last looked.
+        """
+        said = Reasons(self.reader, self._table, self.rules.gate)
+        agents, sights = self._agents, self._sights
+        if self._same:
+            near = [v for v in view.vehicles if v.distance <= self._start and self._follows(v)]
+            agents = {v.id: agents.get(v.id) or Agent(v.id, v.lane, self.rules) for v in near}
+            sights = dict.fromkeys(agents, view)
+        found = reasons_of(said, view, agents, sights)
+        fronts = {v.lane: v for v in reversed(view.vehicles) if v.distance >= 0.0}
+        for v in fronts.values():
+            if v.distance > self._start and self._follows(v):
+                found[v.id] = Reason("comes", v.id)
+        if self._monitors is not None:
+            found |= self._monitors.reasons()
+        return found
 
     def table(self, view: View) -> tuple[DecisionTable, float]:
         """The table for the current ranks, and the time until which they hold [s]."""

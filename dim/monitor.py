@@ -44,6 +44,7 @@ from minisim.control import (
 from minisim.junction.coordination import Region, passes, region
 from minisim.junction.partings import showing
 from minisim.parameters import declared, real
+from minisim.reasons import Reason
 from minisim.vehicle import VehicleType
 
 ROOM = 0.25  #: the gap that a stopping vehicle leaves before the place where it must not be [m]
@@ -99,6 +100,11 @@ class Monitors:
         self._b_max = [min(asked, it.max_deceleration) for it in site.types]
         self._readings: dict[tuple[int, int], set[int]] = {}
         self._braking: dict[int, float] = {}
+        self._for: dict[int, int] = {}  # the vehicle for which each brakes the hardest
+
+    def reasons(self) -> dict[int, Reason]:
+        """Of each vehicle that brakes, for which other one."""
+        return {ego: Reason("monitor", ego, (other,)) for ego, other in self._for.items()}
 
     def look(self, view: View, seen: Mapping[int, View], going: set[int]) -> Iterator[Command]:
         """Which vehicles have to brake, and how hard.
@@ -113,6 +119,7 @@ class Monitors:
         self.needed = waiting or len({v.lane for v in (*crossing, *egos)}) > 1
         before, self._readings = self._readings, {}
         braking: dict[int, float] = {}
+        self._for = {}
         for ego in egos:
             read = {v.id: v.manoeuvre for v in seen[ego.id].vehicles}
             for other in crossing:
@@ -121,7 +128,8 @@ class Monitors:
                 key = ego.id, other.id
                 readings = self._readings[key] = before.get(key, set()) | {read[other.id]}
                 asked = self._asked(ego, other, readings)
-                braking[ego.id] = max(braking.get(ego.id, 0.0), asked)
+                if asked > braking.get(ego.id, 0.0):
+                    braking[ego.id], self._for[ego.id] = asked, other.id
         for vehicle, *_ in view.vehicles:
             asked = braking.get(vehicle, 0.0)
             if asked != self._braking.get(vehicle, 0.0):

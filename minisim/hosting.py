@@ -47,6 +47,7 @@ from minisim.errors import (
     told,
 )
 from minisim.names import name_of
+from minisim.reasons import Witness
 from minisim.results.run import Run, ScenarioLike
 from minisim.ticks import NEVER, first_tick, time_of
 
@@ -112,6 +113,7 @@ class Hosted:
     before: dict[str, float] = field(default_factory=dict)  # counts at the end of the warm-up
     exchange: Counter[str] = field(default_factory=Counter)  # see `Run.exchange`
     times: list[int] = field(default_factory=list)  # of the decisions [ns]
+    witness: Witness | None = None  # what writes down reasons, if the run is to be explained
 
     def ask(self, view: View, tick: int) -> list[Command]:
         """Show the session its view at `tick` and return its commands.
@@ -134,9 +136,21 @@ class Hosted:
             if view.time < self.scenario.warmup:
                 self.exchange.clear()
                 self.times.clear()
+            if self.witness is not None:
+                self.witness.note(commands)
+                self.witness.look(view)
         except (Exception, SystemExit) as error:  # a caller's code may raise anything
             raise _blame(self.controller, error, self.session, f" at {view.time:.1f} s") from error
         return commands
+
+    def look(self, view: View) -> None:
+        """Write down the reasons at the time of a view; `ControllerError` as `ask` raises."""
+        try:
+            if self.witness is not None:
+                self.witness.look(view)
+        except (Exception, SystemExit) as error:  # a caller's code may raise anything
+            session = self.session
+            raise _blame(self.controller, error, session, f" at {view.time:.1f} s") from error
 
     def collided(self, these: Sequence[Collision], replay: Callable[..., Run]) -> CollisionError:
         """The error that stops the run, with a `replay` that records what led to it."""
@@ -165,6 +179,8 @@ class Hosted:
             record_window=self.record_window,
             counts=counts,
             kinds=kinds,
+            reasons=None if self.witness is None else tuple(self.witness.told),
+            heads=None if self.witness is None else tuple(self.witness.shown),
             exchange=dict(self.exchange),
             decision_times=np.array(self.times) / 1e9 if self.timed else None,
             **measured,
@@ -181,6 +197,7 @@ def begin(
     on_collision: str,
     reactions: Sequence[str] = ON_COLLISION,
     timed: bool = False,
+    explain: bool = False,
 ) -> Hosted:
     """Check the arguments, draw the arrivals and start the controller's session.
 
@@ -191,6 +208,7 @@ def begin(
         choice("record", record, RECORDS)
     choice("on_collision", on_collision, reactions)
     instance("timed", timed, bool)
+    instance("explain", explain, bool)
     window = checked_window(record_window)
     if isinstance(scenario, type) or not all(hasattr(scenario, name) for name in NEEDED):
         raise InputError(f"scenario must be a Scenario such as four_way(), got {show(scenario)}")
@@ -198,9 +216,10 @@ def begin(
     site = scenario.site(integer("seed", seed, low=0))
     arrivals = scenario.arrivals(seed)
     arrivals.check(site.intersection.n, site.intersection.allowed_by_lane)
+    session, plan = start(controller, site)
     return Hosted(
-        scenario, controller, int(seed), record, window, on_collision, site, arrivals,
-        *start(controller, site), timed,
+        scenario, controller, int(seed), record, window, on_collision, site, arrivals, session,
+        plan, timed, witness=Witness(site, session) if explain else None,
     )  # fmt: skip
 
 

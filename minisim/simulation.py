@@ -41,7 +41,7 @@ from minisim.jit import direct
 from minisim.laws import build_law
 from minisim.results.run import Run, ScenarioLike
 from minisim.results.trips import collect_trips
-from minisim.ticks import first_tick, time_of
+from minisim.ticks import NEVER, first_tick, time_of
 from minisim.vehicle import CruiseVehicle
 
 #: `Observed._make` without its check of the number of fields, which `OBSERVED` guarantees.
@@ -61,6 +61,8 @@ class Simulation:
             "teleport", for a `CruiseVehicle` only, also lets a vehicle closer than `min_gap` to
             the one ahead on its exit arrive, as SUMO did in the published runs.
         timed: keep the CPU time of each decision (`Run.decision_times`).
+        explain: write down at each step why each vehicle in view waits or goes (`Run.reasons`), and
+            what signal heads show (`Run.heads`). The trips stay the same.
 
     Raises:
         InputError: a value that is not allowed, or a scenario that the controller cannot serve.
@@ -76,10 +78,11 @@ class Simulation:
         record_window: tuple[float, float] = (0.0, math.inf),
         on_collision: str = "stop",
         timed: bool = False,
+        explain: bool = False,
     ) -> None:
         self._hosted = hosted = begin(
             scenario, controller, seed, record=record, record_window=record_window,
-            on_collision=on_collision, reactions=REACTIONS, timed=timed,
+            on_collision=on_collision, reactions=REACTIONS, timed=timed, explain=explain,
         )  # fmt: skip
         self.site, plan = hosted.site, hosted.plan
         teleports = on_collision == "teleport"
@@ -101,6 +104,7 @@ class Simulation:
         self._collisions: dict[tuple[int, int], Collision] = {}
         self._horizon_tick = first_tick(scenario.horizon, self.site.dt)
         self._alarm = Alarm(plan.period, self.site.dt)
+        self._stride = 1 if explain else NEVER  # most steps between two looks for reasons
         self._started = False
         self._done = False
         self.tick = 0
@@ -138,7 +142,7 @@ class Simulation:
             kernel.advance, self._cruise is None, (*world, *scratch, self._traced, self.tick, 0)
         )
         while self.tick < target and not self._done:
-            end = min(target, self._alarm.tick)
+            end = min(target, self._alarm.tick, self.tick + self._stride)
             self.tick, reasons, self._traced, self._seen = step(
                 *world, *scratch, self._traced, self.tick, end
             )
@@ -149,6 +153,8 @@ class Simulation:
             self._done = bool(reasons & kernel.DONE)
             if self.tick >= self._alarm.tick or reasons & (MARKED | CLEAR):
                 self._decide()
+            elif self._hosted.witness is not None:
+                self._hosted.look(self.view())
 
     def run(self) -> Run:
         """Advance to the end and return the result."""
@@ -231,6 +237,7 @@ def simulate(
     record_window: tuple[float, float] = (0.0, math.inf),
     on_collision: str = "stop",
     timed: bool = False,
+    explain: bool = False,
 ) -> Run:
     """Run a scenario under a controller; see `Simulation` for the arguments and errors.
 
@@ -248,4 +255,5 @@ def simulate(
         record_window=record_window,
         on_collision=on_collision,
         timed=timed,
+        explain=explain,
     ).run()

@@ -213,6 +213,20 @@ class FixedTimeSession:
         self._wanted: list[Colour] = []
         self._until = -math.inf  # when the program shows something else [s]
 
+    @property
+    def heads(self) -> Sequence[str]:
+        """What each lane's head shows now (`minisim.reasons.Signalling`)."""
+        return self._heads.shown
+
+    def green_from(self, lane: int, time: float) -> float | None:
+        """When the program shows a lane green next [s]; a head may turn a little later."""
+        switch = time
+        for _ in range(3 * len(self._heads.colours) + 1):  # the stages of one cycle
+            switch = self._programs.next_switch(switch)
+            if self._programs.colours(switch)[lane] is Colour.GREEN:
+                return switch - self._early
+        return None  # it has no green
+
     def decide(self, view: View) -> Iterable[Command]:
         """Turn the heads to what the program shows; a switch less than half a step away is due."""
         now = view.time + self._half_step + self._early

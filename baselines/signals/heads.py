@@ -80,6 +80,11 @@ class Heads:
         self.next_look = math.inf  #: when it must see them again, beside its changes [s]
         self.colours = [Colour.RED] * len(ways)
 
+    @property
+    def shown(self) -> list[str]:
+        """What each lane's head shows now, as a word."""
+        return [colour.value for colour in self.colours]
+
     def show(self, view: View, wanted: Sequence[Colour]) -> list[Command]:
         """Turn the heads to `wanted` as far as that is safe now; return the commands for it.
 

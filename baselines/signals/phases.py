@@ -7,7 +7,7 @@ way any more (`Heads`). A phase is timed from when its green is shown, so driver
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from baselines.signals.facing import phases_of
@@ -79,6 +79,15 @@ class PhaseSession:
         self._colour = Colour.GREEN
         self._began: float | None = None  # when the lane's head turned green
         self._due = math.inf
+
+    @property
+    def heads(self) -> Sequence[str]:
+        """What each lane's head shows now (`minisim.reasons.Signalling`)."""
+        return self._heads.shown
+
+    def green_from(self, lane: int, time: float) -> float | None:  # noqa: ARG002  (Signalling's)
+        """None: when a phase ends depends on the traffic to come."""
+        return None
 
     def see(self, view: View) -> None:
         """Take note of a view; called at every wake-up."""

@@ -32,6 +32,7 @@ from dim.humans.drivers import TRUSTS, Drivers, Humans, Readings
 from dim.humans.queue import Courtesy, Queue
 from minisim.control import HALTING, Command, Go, Observed, Plan, Session, Site, View, Wake
 from minisim.parameters import declared, part, real, word
+from minisim.reasons import Reason
 
 LOOK = 0.2  #: how often a driver at the junction looks at the others [s]
 
@@ -88,6 +89,10 @@ class MixedSession:
         """What wrong perception has done to DIM (`dim.senses.tally`)."""
         return self._dim.counts
 
+    def reasons(self, view: View) -> Mapping[int, Reason]:
+        """Why vehicles wait or go (`minisim.reasons.Explaining`)."""
+        return {**self._dim.reasons(view), **self._people.reasons(view)}
+
     def decide(self, view: View) -> Iterable[Command]:
         """Let all vehicles decide, from the same view."""
         self._queue.look(view)
@@ -127,14 +132,40 @@ class _People:
             there.append(vehicle)
         return [*commands, Wake(now + max(LOOK, self._dt))] if looking else commands
 
+    def reasons(self, view: View) -> dict[int, Reason]:
+        """Why the drivers at the head of their lanes wait."""
+        there = [v for v in view.vehicles if v.distance < 0.0 or v.id in self._gone]
+        found = {}
+        for me in [v for v in self._queue.heads.values() if v.id not in self._gone]:
+            if me.id in self._queue.people:
+                found[me.id] = self._reason(me, view.time, there)
+            there.append(me)
+        return found
+
+    def _reason(self, me: Observed, now: float, there: Iterable[Observed]) -> Reason:
+        if me.id not in self._standing:
+            return Reason("approaching", me.id)
+        if not self._is_ready(me, now):
+            return Reason("reaction", me.id, until=self._ready_at(me))
+        blocking = self._in_the_way(me, there)
+        return Reason("gap too short" if blocking else "looks again", me.id, blocking)
+
     def _is_ready(self, vehicle: Observed, now: float) -> bool:
         """Whether the reaction and follow-up times are over, to within half a step."""
+        return now + self._dt / 2.0 >= self._ready_at(vehicle)
+
+    def _ready_at(self, vehicle: Observed) -> float:
+        """When the reaction and follow-up times are over [s]."""
         humans, turn = self._humans, self._readings.turns[self._readings.index(vehicle)]
         looked = self._standing[vehicle.id] + humans.reaction
-        followed = self._went.get(vehicle.lane, -math.inf) + humans.follow_up[turn]
-        return now + self._dt / 2.0 >= max(looked, followed)
+        return max(looked, self._went.get(vehicle.lane, -math.inf) + humans.follow_up[turn])
 
     def _is_free(self, vehicle: Observed, there: Iterable[Observed]) -> bool:
         """Whether all vehicles that came earlier or cross are out of a driver's way."""
+        return not self._in_the_way(vehicle, there)
+
+    def _in_the_way(self, vehicle: Observed, there: Iterable[Observed]) -> tuple[int, ...]:
+        """Those vehicles that came earlier or cross and are in a driver's way."""
         own = (self._readings.index(vehicle),)
-        return not any(self._readings.blocks(it, own, self._humans.trust) for it in there)
+        trust = self._humans.trust
+        return tuple(it.id for it in there if self._readings.blocks(it, own, trust))

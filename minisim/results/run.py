@@ -19,6 +19,7 @@ from minisim.engine.state import Records
 from minisim.errors import InputError
 from minisim.junction.movements import ARM_NAMES
 from minisim.names import name_of
+from minisim.reasons import Reason, Shown, Told
 from minisim.results.metrics import Asked
 from minisim.results.summary import summarise, trip_table
 from minisim.results.tracks import Tracks, tracks_of
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from minisim.results.safety import Encounters
+    from minisim.results.why import Account
 
 
 class ScenarioLike(Protocol):
@@ -98,6 +100,8 @@ class Run:
     #: First and last time of the recording [s]; the run may have ended earlier.
     record_window: tuple[float, float] = (0.0, math.inf)
     kinds: tuple[str, ...] = ()  #: kind of each vehicle by id; empty if all are of one kind
+    reasons: tuple[Told, ...] | None = None  #: why vehicles waited, by time; None unless `explain`
+    heads: tuple[Shown, ...] | None = None  #: what signal heads showed, by time; None likewise
     #: What moved the vehicles, for the provenance: the `host` and perhaps its version.
     host: Mapping[str, str] = field(default_factory=lambda: {"host": "minisim"})
     environment: Mapping[str, str] = field(default_factory=environment)
@@ -139,6 +143,24 @@ class Run:
         from minisim.results.safety import encounters_of
 
         return encounters_of(self)
+
+    def why(self, vehicle: int, time: float) -> Reason:
+        """Why a vehicle did what it did at a time [s].
+
+        A run without reasons, or without all trajectories, is run again for the first question
+        (`explained`), which takes about as long as the run did with `explain=True`.
+
+        Raises `InputError` for a vehicle or a time that the run does not have, and for a run that
+        cannot be run again: one in SUMO, or a saved one whose classes are not ours.
+        """
+        return self.explained.why(vehicle, time)
+
+    @cached_property
+    def explained(self) -> Account:
+        """The reasons of all vehicles at all times; see `why` for its cost and errors."""
+        from minisim.results.why import account_of
+
+        return account_of(self)
 
     def summary(
         self, metrics: str | Iterable[Asked] = (), by: Iterable[str] = ()

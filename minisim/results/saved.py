@@ -31,7 +31,7 @@ from minisim.results.trips import TRIP_ARRAYS, Trips
 
 #: The type of file, and the layout that this version writes.
 MARK: Final = "minisim run"
-LAYOUT: Final = 3
+LAYOUT: Final = 4
 
 #: Packages whose classes are written as class and fields.
 PACKAGES: Final = ("minisim", "dim", "baselines", "scenarios")
@@ -39,7 +39,7 @@ PACKAGES: Final = ("minisim", "dim", "baselines", "scenarios")
 #: The fields of a run that hold plain values.
 _VALUES: Final = (
     "seed", "site", "plan", "collisions", "record", "record_window", "counts", "exchange",
-    "host", "environment",
+    "host", "environment", "reasons", "heads",
 )  # fmt: skip
 
 

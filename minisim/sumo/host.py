@@ -63,6 +63,7 @@ def simulate(
     record_window: tuple[float, float] = (0.0, math.inf),
     on_collision: str = "stop",
     timed: bool = False,
+    explain: bool = False,
     keep_files: str | os.PathLike[str] | None = None,
     fcd: str | os.PathLike[str] | None = None,
     gui: bool = False,
@@ -87,6 +88,8 @@ def simulate(
             ahead or waits for 300 s is moved to the next road, or counts as arrived if there is
             none. Touching inside the junction does not count.
         timed: keep the CPU time of each decision (`Run.decision_times`).
+        explain: write down at each wake-up why each vehicle in view waits or goes (`Run.reasons`),
+            and what signal heads show (`Run.heads`).
         keep_files: new or empty folder for SUMO's files, which are temporary by default: network,
             routes, configuration, log and trips. If the run fails, they stay, and the exception
             has a note that names the folder.
@@ -108,7 +111,7 @@ def simulate(
         _check_display()
     hosted = begin(
         scenario, controller, seed, record=record, record_window=record_window,
-        on_collision=on_collision, reactions=REACTIONS, timed=timed,
+        on_collision=on_collision, reactions=REACTIONS, timed=timed, explain=explain,
     )  # fmt: skip
     return _run(hosted, _Options(home, model, keep_files, fcd, gui, progress))
 
