@@ -48,5 +48,5 @@ def _inline(writer: HTML5Translator, node: nodes.math) -> NoReturn:
 
 
 def _block(writer: HTML5Translator, node: nodes.math_block) -> NoReturn:
-    writer.body.append(f'<div class="math">{tex2mathml(node.astext(), as_block=True)}</div>')
+    writer.body.append(f"<div>{tex2mathml(node.astext(), as_block=True)}</div>")
     raise nodes.SkipNode
