@@ -63,7 +63,7 @@ class Frames:
         gone = frame[(self.s > clear) & np.isinf(self.harmed)].groupby("vehicle")["time_s"].min()
         cleared = np.sort(gone.to_numpy())
         # A vehicle that was clear before the first frame does not count as served.
-        self.cleared = cleared[cleared > frame["time_s"].iloc[0]]
+        self.cleared = cleared[cleared > max(start, frame["time_s"].iloc[0])]
 
     def at(self, time: float) -> slice:
         """The rows of one step."""
