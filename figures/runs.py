@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from itertools import cycle
-from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -17,7 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from figures import style
-from figures.whole import filmed, heads, whole
+from figures.whole import filmed, head_spans, whole
 from minisim.errors import choice, number
 from minisim.junction.movements import ARM_NAMES
 from minisim.junction.paths import Floats
@@ -25,6 +24,8 @@ from minisim.results.queues import JAM_SPEED, JAM_TIME, queue_lengths
 from minisim.results.run import Run
 from minisim.ticks import first_tick
 
+#: How far behind the junction entry a time-space diagram goes [m].
+BEYOND = 150.0
 #: How lanes are drawn one after the other, so that they differ without colour too.
 STROKES = (
     (style.BLUE, "-"), (style.VERMILLION, "--"), (style.GREEN, "-."), (style.PURPLE, ":"),
@@ -55,6 +56,8 @@ def time_space(
     order = np.argsort(vehicle, kind="stable")
     vehicle, gone, points = vehicle[order], gone[order], points[order]
     pairs = np.stack([points[:-1], points[1:]], axis=1)[vehicle[:-1] == vehicle[1:]]
+    exits = np.array([path.exit for path in intersection.paths])[rows["path"][shown][order]]
+    gone &= points[:, 1] <= exits - intersection.paths[0].entry
     goes = gone[1:][vehicle[:-1] == vehicle[1:]]
     for mine, colour, width in ((~goes, style.FREE, 0.9), (goes, style.RIGHT_OF_WAY, 1.3)):
         axes.add_collection(LineCollection(list(pairs[mine]), colors=colour, linewidths=width))
@@ -80,29 +83,9 @@ def time_space(
         head = style.HEADS[state]
         keys.append(Line2D([], [], color=head.colour, linewidth=head.width, label=state))
     axes.set_xlim(start, last)
-    axes.set_ylim(-intersection.approach_length, float(points[:, 1].max(initial=20.0)))
+    axes.set_ylim(-intersection.approach_length, BEYOND)
     style.plot_axes(axes, f"Lane {lane}", "time [s]", "front bumper after the junction entry [m]")
     return _keyed(axes, keys)
-
-
-class HeadSpan(NamedTuple):
-    """A time during which a lane's head shows one state, from `start` to `end` [s]."""
-
-    lane: int
-    state: str
-    start: float
-    end: float
-
-
-def head_spans(run: Run) -> list[HeadSpan]:
-    """What each signal head showed, and when; empty without signals."""
-    since: dict[int, tuple[str, float]] = {}
-    spans = []
-    for time, lane, state in heads(run):
-        if lane in since:
-            spans.append(HeadSpan(lane, *since[lane], time))
-        since[lane] = state, time
-    return spans + [HeadSpan(lane, *known, run.columns.end) for lane, known in since.items()]
 
 
 def queues(run: Run, *, ax: Axes | None = None) -> Figure:
@@ -120,7 +103,7 @@ def queues(run: Run, *, ax: Axes | None = None) -> Figure:
     axes.set_ylim(bottom=0.0)
     axes.margins(x=0.0)
     what = f"slower than {3.6 * JAM_SPEED:g} km/h for {JAM_TIME:g} s, or waiting before the road"
-    style.plot_axes(axes, "Queues", "time [s]", f"vehicles in the queue\n({what})")
+    style.plot_axes(axes, "Queues", f"time [s]; in the queue: {what}", "vehicles in the queue")
     return _keyed(axes)
 
 
@@ -135,7 +118,7 @@ def cumulative(run: Run, *, ax: Axes | None = None) -> Figure:
     arrivals, departures = cumulative_times(run)
     delay = float((end - arrivals).sum() - (end - departures).sum())
     arrivals = arrivals[arrivals < end]
-    grid = np.unique(np.concatenate([arrivals, departures, [end]]))
+    grid = np.unique(np.concatenate([[run.counted.columns.start, end], arrivals, departures]))
     curves = [np.searchsorted(np.sort(times), grid, "right") for times in (arrivals, departures)]
     axes.fill_between(grid, curves[1], curves[0], step="post", color=style.SKY, alpha=0.35)
     looks = (("arrivals, had nothing delayed them", style.VERMILLION, "--"),

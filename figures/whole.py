@@ -1,11 +1,13 @@
 """What a picture of a run needs to know, run again if it was not recorded.
 
 A run is run again from its own scenario, controller and seed, at most once (`Run.explained`). That
-takes as long as the run did with `record="all"` and `explain=True`: about three times as long as
-without. Whoever draws several pictures of a long run had better simulate with both at once.
+looks for reasons at each step: 15 minutes on four arms at 300 veh/h/lane take 1.3 s of CPU instead
+of 0.02 s. A run that was simulated with `record="all"` and `explain=True` is never run again.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 from minisim.errors import InputError
 from minisim.reasons import Shown, Signalling
@@ -49,3 +51,23 @@ def heads(run: Run) -> tuple[Shown, ...]:
     if not isinstance(run.controller.start(run.site), Signalling):
         return ()
     return run.explained.run.heads or ()
+
+
+class HeadSpan(NamedTuple):
+    """A time during which a lane's head shows one state, from `start` to `end` [s]."""
+
+    lane: int
+    state: str
+    start: float
+    end: float
+
+
+def head_spans(run: Run) -> list[HeadSpan]:
+    """What each signal head showed, and when; empty without signals."""
+    since: dict[int, tuple[str, float]] = {}
+    spans = []
+    for time, lane, state in heads(run):
+        if lane in since:
+            spans.append(HeadSpan(lane, *since[lane], time))
+        since[lane] = state, time
+    return spans + [HeadSpan(lane, *known, run.columns.end) for lane, known in since.items()]

@@ -7,6 +7,7 @@ import io
 import json
 import math
 import re
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import combinations, product
 from pathlib import Path
@@ -21,13 +22,14 @@ from hypothesis import strategies as st
 from PIL import Image
 
 import minisim
+from baselines import FixedTime
 from dim import Dim, HarmonyMatrix, explain
 from figures import animation, decision, performance_figure, style, write_animation
 from figures.film.animate import Picture, frame_times
 from figures.film.encode import COLOURS, palette_of, write_gif, write_html
 from figures.film.frames import RELEASED, Frames
 from figures.junction import drawing
-from figures.whole import filmed
+from figures.whole import filmed, head_spans
 from minisim.control import Plan, Unregulated
 from minisim.errors import InputError
 from minisim.fleet import TYPES
@@ -35,7 +37,7 @@ from minisim.junction.conflicts import corridor
 from minisim.junction.geometry import Intersection
 from minisim.results.run import Run
 from minisim.vehicle import VehicleType
-from scenarios import four_way
+from scenarios import Scenario, five_way, four_way
 from scenarios.controllers import VARIANTS
 from scenarios.profiles import FAIR
 from tests.builders import Fixed, replayed
@@ -141,6 +143,43 @@ def test_lanes_open_with_their_first_vehicle(film: Frames) -> None:
     assert opened
 
 
+def test_a_film_shows_what_the_heads_show_at_all_times(tmp_path: Path) -> None:
+    """Also where no vehicle comes, and amber: the run was not asked for its heads."""
+    run = minisim.simulate(four_way(100, horizon=120), FixedTime(), seed=2, record="all")
+    film, spans, seen = Frames(run, 0.0), head_spans(run), set()
+    picture = Picture(run)
+    for time in frame_times(0.0, 119.0, 2.0, 0.1).tolist():
+        shown = film.heads(time)
+        for span in spans:
+            if span.start <= time < span.end:
+                assert shown[span.lane] == span.state
+        seen |= set(shown.values())
+        if time % 10 < 0.1:
+            picture.draw(time)
+            drawn = {state: len(marks.get_xdata()) for state, marks in picture._heads.items()}
+            assert drawn == {state: [*shown.values()].count(state) for state in style.HEADS}
+    assert seen == set(style.HEADS)
+    words = {text.get_text() for text in picture._figure.texts}
+    assert words >= {"green", "amber", "red", "band: its way"}
+
+
+@pytest.mark.parametrize("make", [four_way, five_way])
+def test_arrows_on_roofs_point_where_vehicles_leave(make: Callable[..., Scenario]) -> None:
+    run = minisim.simulate(make(300, horizon=60), Dim(), seed=1, record="all")
+    film, arms = Frames(run, 0.0), run.site.intersection.arms
+    rows = film.rows(film.at(film.busiest), 1e9)
+    rows = rows[film.s[rows] <= film.exit[film.path[rows]]]
+    arrows, manoeuvres = film.arrows(rows), set()
+    for arrow, path in zip(arrows, film.path[rows].tolist(), strict=True):
+        way = run.site.intersection.paths[path]
+        forward = arrow[0] - arrow[3:5].mean(axis=0)
+        np.testing.assert_allclose(
+            forward / np.linalg.norm(forward), arms[way.exit_arm].outward, atol=1e-9
+        )
+        manoeuvres.add(way.movement.manoeuvre)
+    assert manoeuvres == set(range(1, len(arms)))
+
+
 def test_ways_end_at_the_exit(run: Run, film: Frames) -> None:
     exits = np.array([path.position(path.exit) for path in run.site.intersection.paths])
     ways = [way for t in range(101, 130) for way in film.ways(film.rows(film.at(t), 1e9))]
@@ -215,8 +254,8 @@ def test_picture_shows_the_vehicles(run: Run, picture: Picture) -> None:
             if not row.right_of_way and row.speed_mps > 0.1:
                 continue
             heading = np.radians(row.angle_deg)
-            rear = (row.x_m - 3.2 * np.sin(heading), row.y_m - 3.2 * np.cos(heading))
-            x, y = picture._axes.transData.transform(rear)
+            hood = (row.x_m - 0.8 * np.sin(heading), row.y_m - 0.8 * np.cos(heading))
+            x, y = picture._axes.transData.transform(hood)
             colour = image[image.shape[0] - 1 - round(y), round(x)]
             wanted = style.RIGHT_OF_WAY if row.right_of_way else style.WAITING
             assert np.abs(colour - rgb(wanted)).max() < 12

@@ -7,13 +7,14 @@ from itertools import combinations, pairwise
 import numpy as np
 import pytest
 from matplotlib.collections import LineCollection
+from matplotlib.colors import to_hex
 
 import minisim
 from baselines import FixedTime
 from dim import Dim
 from figures import cumulative, queues, style, time_space
-from figures.runs import STROKES, cumulative_times, head_spans
-from figures.whole import heads, whole
+from figures.runs import STROKES, cumulative_times
+from figures.whole import head_spans, heads, whole
 from minisim.errors import InputError
 from minisim.results.queues import queue_lengths
 from minisim.results.run import Run
@@ -70,7 +71,7 @@ def test_queues_are_those_of_the_metric(run: Run) -> None:
     assert lengths.max() > 1
     drawn = np.stack([line.get_ydata() for line in axes.lines], axis=1)
     np.testing.assert_array_equal(drawn, lengths)
-    assert "5 km/h" in axes.get_ylabel()
+    assert "slower than 5 km/h for 1 s" in axes.get_xlabel()
 
 
 def test_a_time_space_diagram_shows_every_vehicle_of_the_lane(run: Run) -> None:
@@ -82,6 +83,9 @@ def test_a_time_space_diagram_shows_every_vehicle_of_the_lane(run: Run) -> None:
     entry = run.site.intersection.paths[0].entry
     steps = len(mine) - mine["vehicle"].nunique()
     assert len(segments) == steps
+    blue = sum(len(c.get_segments()) for c in axes.collections
+               if to_hex(c.get_color()[0]).upper() == style.RIGHT_OF_WAY)  # fmt: skip
+    assert 0 < blue <= mine["right_of_way"].sum()
     wanted = {(round(t, 3), round(s - entry, 3)) for t, s in mine[["time_s", "s_m"]].to_numpy()}
     assert {tuple(np.round(p, 3)) for s in segments for p in s} <= wanted
 
