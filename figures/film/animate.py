@@ -239,7 +239,7 @@ class Picture:
 
     def _swatch(self, x: float, y: float, colour: str, shape: str) -> None:
         """A body, area, band or line, or the marker of a signal head."""
-        on = {"transform": self._figure.transFigure}
+        on: dict[str, Any] = {"transform": self._figure.transFigure}
         if shape not in ("body", "area", "band", "line"):
             self._figure.add_artist(Line2D(
                 [x + 0.02], [y / HEIGHT], color=colour, marker=shape, markersize=9.0,

@@ -23,7 +23,7 @@ CELLS = (
 
 @pytest.mark.slow
 def test_every_figure_shows_itself(tmp_path: Path) -> None:
-    reason = "needs nbclient and ipykernel, of the extra `notebook`"
+    reason = "needs nbclient and ipykernel, which the extra `docs` brings"
     nbformat = pytest.importorskip("nbformat", reason=reason)
     nbclient = pytest.importorskip("nbclient", reason=reason)
     pytest.importorskip("ipykernel", reason=reason)
