@@ -15,7 +15,6 @@ other has said that it holds.
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 
 from baselines.reservation import POSITION_TOLERANCE, Reservation, ReservationSession, Slot
@@ -33,7 +32,6 @@ class PromiseSession(ReservationSession):
         self._rows = site.intersection.movements.rows
         self._exits = [path.exit_arm for path in site.intersection.paths]
         self._wait = steps(channel.slowest, site.dt)
-        self._longer = steps(controller.period, site.dt)
         if reach is None:
             late = 2.0 * channel.slowest + controller.radio.interval
             reach = min(
@@ -43,7 +41,6 @@ class PromiseSession(ReservationSession):
         self._slack = controller.buffer / 2.0 / site.dt
         self._reports: Mapping[int, Report] = {}
         self._effect: dict[int, int] = {}  #: when each vehicle's reservation takes effect [steps]
-        self._unheard: Counter[int] = Counter()  #: how many promises each vehicle did not hear
         self._sure: set[int] = set()  #: vehicles that are known to keep to their passages
         self._strays: list[Observed] = []  #: that hold the right of way after their passage
 
@@ -63,7 +60,6 @@ class PromiseSession(ReservationSession):
                 continue
             if not report.holds:
                 del slots[vehicle]
-                self._unheard[vehicle] += 1
             elif leader is None or leader in self._sure:
                 self._sure.add(vehicle)
         yield from ()
@@ -72,10 +68,9 @@ class PromiseSession(ReservationSession):
         """Reserve what is possible; return the ids of the new holders."""
         slots = self.manager.slots
         for vehicle in list(self._requests):
-            effect = now + self._wait + self._unheard[vehicle] * self._longer
-            slot = self._passage(seen[vehicle], ahead.get(vehicle), effect)
+            slot = self._passage(seen[vehicle], ahead.get(vehicle), now + self._wait)
             if slot is not None and self.manager.fits(slot, last=True):
-                slots[vehicle], self._effect[vehicle] = slot, effect
+                slots[vehicle], self._effect[vehicle] = slot, now + self._wait
                 del self._requests[vehicle]
                 yield vehicle
 

@@ -100,8 +100,6 @@ class Link:
         random = Chances(site.seed)
         self._up: Air[Status] = Air(site.channel, site.dt, random)
         self._down: Air[Order | Reserve | Confirmed] = Air(site.channel, site.dt, random)
-        self._slowest = steps(site.channel.slowest, site.dt)
-        self._promises: dict[int, tuple[int, Reserve]] = {}  # by vehicle, and when to send each
         self._alarm = Alarm(plan.period, site.dt)
         self._due = 0  # when vehicles speak next
         self._began = False
@@ -141,8 +139,8 @@ class Link:
                 self._down.send(now, Confirmed(status.vehicle.id))
         if wake:
             commands += self._decide(now)
-        for message in (*self._promised(now), *office.orders(now, self._interval)):
-            self._down.send(now, message)
+        for order in office.orders(now, self._interval):
+            self._down.send(now, order)
         for message in self._down.receive(now):
             commands += vehicles.obey(message, now)
         commands += vehicles.reserve(now)
@@ -159,27 +157,14 @@ class Link:
             if isinstance(command, Wake):
                 self._alarm.set(command)
             elif isinstance(command, Reserve):
-                self._promises[command.vehicle] = now, command
+                self._down.send(now, command)
             elif isinstance(command, Go | Hold | Advise | Brake):
                 self._office.take(command)
             else:
                 yield command
 
-    def _promised(self, now: int) -> Iterator[Reserve]:
-        """The promises to send now: each at once, and again while that is sure to come in time."""
-        for vehicle, (due, promise) in list(self._promises.items()):
-            if now >= due:
-                yield promise
-                again = now + self._interval
-                self._promises[vehicle] = again, promise
-                if time_of(again + self._slowest, self._dt) > promise.time:
-                    del self._promises[vehicle]
-
     def _next(self, now: int) -> int | None:
         """When to be woken next; None if nothing is under way."""
         talking = self._vehicles.talking or self._office.talking
-        due = min(
-            self._due if talking else NEVER, self._up.next, self._down.next, self._alarm.tick,
-            *(due for due, _ in self._promises.values()),
-        )  # fmt: skip
+        due = min(self._due if talking else NEVER, self._up.next, self._down.next, self._alarm.tick)
         return None if due == NEVER else max(due, now + 1)
