@@ -28,7 +28,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any, Literal, TypeAlias
 
 from dim.agent import GATES, Agent, Rules
@@ -185,6 +185,16 @@ def _rests(dim: Dim, looks: float | None, takes: object) -> bool:
 _plan = lru_cache(maxsize=256)(Plan)
 
 
+def _taken(
+    takes: Callable[[View, View], View],
+    see: Callable[[View, Observed], View],
+    view: View,
+    ego: Observed,
+) -> View:
+    """What a vehicle makes of what it sees. (No closure: a fork copies the state of both.)"""
+    return takes(view, see(view, ego))
+
+
 class DimSession:
     """One run of DIM: hosts an agent for each vehicle that takes part and that `follows` DIM.
 
@@ -227,7 +237,7 @@ class DimSession:
         self._start = zones.yellow_start + ROUNDING
         self._ranks = ranking_of(dim.priorities, site, zones, dim.turn_time, dim.sensor_range)
         see = dim.perception.start(site)
-        self.see = see if takes is None else lambda view, ego: takes(view, see(view, ego))
+        self.see = see if takes is None else partial(_taken, takes, see)
         self._monitors = dim.monitor.start(site, matrix, self._start) if dim.monitor else None
         self._dt, self._follows, self._takes = site.dt, follows, takes
         self._agents: dict[int, Agent] = {}
