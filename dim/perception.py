@@ -72,8 +72,8 @@ class Percept(NamedTuple):
     #: Lanes of participants with `UNKNOWN` intent, which are not in the case; bit i for lane i, or
     #: as `DecisionTable.surely` has it.
     unknown: int = 0
-    #: Movements that may not enter, bit k for the k-th, since vehicles inside that have left some
-    #: ways, and are not in `occupied`, are still in theirs (gate "passed").
+    #: Movements that may not enter, bit k for the k-th, since crossing vehicles of known intent,
+    #: which are then not in `occupied`, are still in their way (gate "passed").
     barred: int = 0
 
     @property
@@ -125,7 +125,7 @@ class Reader(NamedTuple):
                 lane_served = lane
             if distance < 0.0 or self.committed(vehicle):
                 crossing.append(vehicle.id)
-                if self.passing and distance < 0.0 and manoeuvre != UNKNOWN:
+                if self.passing and manoeuvre != UNKNOWN:
                     barred |= self.passing.bars(vehicle)
                     continue
                 occupied |= bits[lane][manoeuvre] << kind * len(movements)

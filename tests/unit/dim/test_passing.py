@@ -8,9 +8,10 @@ import pytest
 
 from dim import Dim, HarmonyMatrix
 from dim.passing import Passing
+from dim.perception import UNKNOWN
 from minisim.junction.coordination import region
 from scenarios import Scenario, five_way, four_way, three_way
-from tests.builders import car
+from tests.builders import car, view
 
 JUNCTIONS = [three_way(), four_way(), five_way()]
 
@@ -70,3 +71,10 @@ def test_what_only_the_matrix_has_in_conflict_bars_until_it_has_left() -> None:
     values = HarmonyMatrix.paper(4).values.copy()
     values[:] = False
     assert len(bars(four_way(), "a1", 100.0, HarmonyMatrix(4, values))) >= 5
+
+
+def test_one_of_unknown_intent_bars_all_foes_of_its_lane_however_far_it_is() -> None:
+    reader = Dim(gate="passed").start(four_way().site()).reader
+    lost = car(1, "b2", -15.5)._replace(manoeuvre=UNKNOWN)
+    percept = reader.read(view(lost))
+    assert (percept.occupied, percept.barred) == (0b111 << 3, 0)

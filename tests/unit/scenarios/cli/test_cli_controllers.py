@@ -34,7 +34,7 @@ def test_nested_recipes_are_listed_too(capsys: Captured) -> None:
     text = ok(capsys, "controllers", "dim")
     assert "perception=noisy(…): " in text
     given = ok(capsys, "controllers", "dim:gate=harmonious,monitor=on(patience=3)")
-    assert "\n  gate=harmonious  (clear | harmonious)" in given
+    assert "\n  gate=harmonious  (clear | harmonious | passed)" in given
     assert "\n  patience=3 [s]" in given
     assert "\n  patience=2 [s]  (0.5 … 60)\n      how long " in text
 
