@@ -43,12 +43,12 @@ KINDS: Mapping[str, str] = {
     ),
     "looks again": "Vehicle {me} decides again when it next looks.",
     "monitor": "Vehicle {me} is braked by its safety monitor for {others}.",
-    "red": "Vehicle {me} waits at a red signal{head}.",
-    "amber": "Vehicle {me} stops at an amber signal{head}.",
+    "red": "Vehicle {me} waits: its signal has been red{head}.",
+    "amber": "Vehicle {me} stops: its signal has been amber{head}.",
     "gap": "Vehicle {me} has a green signal, but must yield to the traffic that faces it.",
     "approaching": "Vehicle {me} must first stand at the line.",
-    "reaction": "Vehicle {me} has stopped and looks; it may go from {until} on.",
-    "gap too short": (
+    "reaction": "Vehicle {me} has stopped and looks; it cannot go before {until}.",
+    "others first": (
         "The driver of vehicle {me} waits for {others}, which came earlier or {cross} in its way."
     ),
     "turn": "Vehicle {me} waits for its turn: {others} came first.",
