@@ -136,3 +136,9 @@ def test_lanes_and_heads_are_told_apart_by_colour_or_shape(eyes: str) -> None:
     for one, other in combinations(style.HEADS.values(), 2):
         assert one.marker != other.marker
         assert max(one.width, other.width) >= 1.5 * min(one.width, other.width)
+
+
+@pytest.mark.parametrize("eyes", EYES)
+def test_states_of_vehicles_are_told_apart(eyes: str) -> None:
+    for one, other in combinations((style.RIGHT_OF_WAY, style.WAITING, style.FREE), 2):
+        assert apart(one, other, eyes) >= 20.0
