@@ -42,6 +42,15 @@ KINDS: Mapping[str, str] = {
         "could go in every case."
     ),
     "looks again": "Vehicle {me} decides again when it next looks.",
+    "passage": "Vehicle {me} has a passage through the junction, and enters it at {until}.",
+    "no passage": "Vehicle {me} has no passage yet: none fits {others}.",
+    "after": "Vehicle {me} is to pass at {until}, after {others} on a way that conflicts.",
+    "planned": "Vehicle {me} is to pass at {until}, as planned.",
+    "listed": "Vehicle {me} is in the serving list after {others} on a way that conflicts.",
+    "not heard": "Vehicle {me} has not been heard by the controller yet.",
+    "not told": "Vehicle {me} may go, but the message that says so has not reached it yet.",
+    "told for later": "Vehicle {me} has a passage, and the right of way from {until} on.",
+    "in doubt": "Vehicle {me} waits until it is known that {others} {no_longer} the right of way.",
     "monitor": "Vehicle {me} is braked by its safety monitor for {others}.",
     "red": "Vehicle {me} waits at a red signal{head}.",
     "amber": "Vehicle {me} stops at an amber signal{head}.",
@@ -86,7 +95,9 @@ class Reason:
             since="?" if self.since is None else f"{self.since:.1f} s",
             until="?" if self.until is None else f"{self.until:.1f} s",
             head=head, note=self.note, is_are="is" if one else "are",
-            hold="holds" if one else "hold", cross="crosses" if one else "cross",
+            hold="holds" if one else "hold",
+            no_longer="no longer holds" if one else "no longer hold",
+            cross="crosses" if one else "cross",
         ).strip()  # fmt: skip
 
     def as_dict(self) -> dict[str, Any]:
