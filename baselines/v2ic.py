@@ -106,14 +106,15 @@ class V2ICSession:
             yield Wake(view.time + self._period)
 
     def reasons(self, view: View) -> dict[int, Reason]:
-        """Why the first vehicles of the lanes wait (`minisim.reasons.Explaining`)."""
+        """Why vehicles wait that have none ahead of them waiting (`minisim.reasons.Explaining`)."""
         seen = {vehicle.id: vehicle for vehicle in view.vehicles}
         rows = {v.id: self._rows[v.lane][v.manoeuvre] for v in view.vehicles}
-        fronts = {v.lane: v.id for v in reversed(view.vehicles) if v.distance >= 0.0}
+        waiting = [v for v in reversed(view.vehicles) if v.id not in self.granted]
+        fronts = {v.lane: v.id for v in waiting}
         order = [vehicle for vehicle in self.order if vehicle in seen]
         found = {}
         for me in fronts.values():
-            if me in order and me not in self.granted:
+            if me in order:
                 before = order[: order.index(me)]
                 others = tuple(v for v in before if rows[v] in self._foes[rows[me]])
                 found[me] = Reason("listed" if others else "looks again", me, others)

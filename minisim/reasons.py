@@ -43,7 +43,9 @@ KINDS: Mapping[str, str] = {
     ),
     "looks again": "Vehicle {me} decides again when it next looks.",
     "passage": "Vehicle {me} has a passage through the junction, and enters it at {until}.",
-    "no passage": "Vehicle {me} has no passage yet: none fits {others}.",
+    "no passage": (
+        "Vehicle {me} has no passage yet: the one that it asks for does not fit that of {others}."
+    ),
     "after": "Vehicle {me} is to pass at {until}, after {others} on a way that conflicts.",
     "planned": "Vehicle {me} is to pass at {until}, as planned.",
     "listed": "Vehicle {me} is in the serving list after {others} on a way that conflicts.",
@@ -54,7 +56,10 @@ KINDS: Mapping[str, str] = {
     "monitor": "Vehicle {me} is braked by its safety monitor for {others}.",
     "red": "Vehicle {me} waits at a red signal{head}.",
     "amber": "Vehicle {me} stops at an amber signal{head}.",
-    "gap": "Vehicle {me} has a green signal, but must yield to the traffic that faces it.",
+    "gap": (
+        "Vehicle {me} has a green signal, but waits for a gap: {others} {cross} on a way that "
+        "conflicts."
+    ),
     "approaching": "Vehicle {me} must first stand at the line.",
     "reaction": "Vehicle {me} has stopped and looks; it may go from {until} on.",
     "gap too short": (
@@ -88,8 +93,8 @@ class Reason:
     def sentence(self) -> str:
         """The reason in plain words."""
         one = len(self.vehicles) == 1
-        head = "" if self.since is None else f" since {self.since:.1f} s"
-        head += "" if self.until is None else f"; it turns green at {self.until:.1f} s"
+        head = "" if self.since is None else f": it turned {self.kind} at {self.since:.1f} s"
+        head += "" if self.until is None else f", and turns green at {self.until:.1f} s"
         return KINDS[self.kind].format(
             me=self.vehicle, others=_listed(self.vehicles), clique=" ".join(self.clique),
             since="?" if self.since is None else f"{self.since:.1f} s",
