@@ -64,7 +64,9 @@ class Vehicles:
     def reason(self, vehicle: int) -> Reason | None:
         """Why it waits, if it knows from when on it may go."""
         passage = self._units[vehicle].reserved
-        return passage and Reason("told for later", vehicle, until=passage.time)
+        if passage is None:
+            return None
+        return Reason("told for later", vehicle, until=passage.time)
 
     def statuses(self, now: int) -> Iterator[Status]:
         """What they say now."""
