@@ -12,7 +12,7 @@ TEST   := $(BIN)/python -m pytest -n auto --maxprocesses 8 --dist worksteal
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-all lint bench mutants pictures figures reproduce clean
+.PHONY: help demo test test-all lint bench mutants docs pictures figures reproduce clean
 
 help:  ## show this list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' Makefile | expand -t 18
@@ -38,6 +38,9 @@ bench: $(VENV)/.installed-all  ## speed, beside SUMO and C in the same run; BENC
 mutants: $(VENV)/.installed-mutants  ## do the tests notice when dim is changed? A long run; a second call continues it
 	$(BIN)/python tests/mutants.py run
 	$(BIN)/python tests/mutants.py table
+
+docs: $(VENV)/.installed-docs  ## the site, in out/site; warnings are errors, and no network is needed
+	$(BIN)/python -m sphinx -q -W --keep-going -b html docs out/site
 
 pictures: demo  ## the pictures of README and docs, redrawn from out/runs.sqlite (make reproduce)
 	cp out/demo.png out/demo.gif docs
@@ -75,9 +78,13 @@ $(VENV)/.installed-dev: $(VENV)/.installed
 	@touch $@
 
 $(VENV)/.installed-all: $(VENV)/.installed-dev
-	$(PIP) -e '.[dev,sumo,dask]'
+	$(PIP) -e '.[dev,sumo,dask,docs]'
 	@touch $@
 
 $(VENV)/.installed-mutants: $(VENV)/.installed-all
 	$(PIP) -e '.[mutants]'
+	@touch $@
+
+$(VENV)/.installed-docs: $(VENV)/.installed
+	$(PIP) -e '.[docs]'
 	@touch $@

@@ -15,6 +15,9 @@ from numbers import Integral, Real
 from pathlib import Path
 from typing import Any
 
+#: The name to install minisim by: the package index has an unrelated project called minisim.
+DISTRIBUTION = "minisim-traffic"
+
 #: What users call values of these classes.
 _WORDS: Mapping[type, str] = {
     bool: "true or false", int: "a whole number", float: "a number", str: "a text",
@@ -60,6 +63,11 @@ class ControllerError(MinisimError):
 
 class MissingExtraError(MinisimError):
     """An optional dependency is needed and not installed."""
+
+
+def extra(name: str) -> str:
+    """The command that installs an extra: one of the keys of `optional-dependencies`."""
+    return f"pip install '{DISTRIBUTION}[{name}]'"
 
 
 class ExecutorError(MinisimError):

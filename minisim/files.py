@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from minisim.errors import FileError, InputError, MissingExtraError, choice, instance
+from minisim.errors import FileError, InputError, MissingExtraError, choice, extra, instance
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -175,8 +175,7 @@ def _table_suffix(path: AnyPath) -> str:
     instance("output file", path, (str, os.PathLike))
     suffix = _check_suffix(path, TABLE_SUFFIXES)
     if suffix == ".parquet" and importlib.util.find_spec("pyarrow") is None:
-        wanted = "pip install 'minisim[parquet]' (or write .csv)"
-        raise MissingExtraError(f"Parquet needs pyarrow: {wanted}")
+        raise MissingExtraError(f"Parquet needs pyarrow: {extra('parquet')} (or write .csv)")
     return suffix
 
 

@@ -9,7 +9,7 @@
     def test_nothing_collides(scenario, controller):
         simulate(scenario, controller)  # a collision raises
 
-minisim's own tests use them, and yours can too: `pip install 'minisim[testing]'`.
+minisim's own tests use them, and yours can too: `pip install 'minisim-traffic[testing]'`.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ import numpy as np
 
 from minisim.control import Controller
 from minisim.demand import MODELS, Demand, DemandProfile, Period
-from minisim.errors import InputError, MissingExtraError
+from minisim.errors import InputError, MissingExtraError, extra
 from minisim.fleet import TYPES, Fleet
 from minisim.junction.conflicts import entry_room
 from minisim.junction.geometry import MIN_ANGLE, Intersection
@@ -38,7 +38,7 @@ try:
     from hypothesis import assume, reject
     from hypothesis import strategies as st
 except ImportError as error:
-    raise MissingExtraError("strategies need hypothesis: pip install 'minisim[testing]'") from error
+    raise MissingExtraError(f"strategies need hypothesis: {extra('testing')}") from error
 
 SIDES: tuple[Literal["left", "right"], ...] = ("left", "right")
 

@@ -24,7 +24,7 @@ from typing import Any, ClassVar, Final, NoReturn
 import numpy as np
 import pandas as pd
 
-from minisim.errors import FileError, InputError, MissingExtraError, instance, show
+from minisim.errors import FileError, InputError, MissingExtraError, extra, instance, show
 from minisim.files import read_file, replacing
 from minisim.results.run import Run
 from minisim.results.trips import TRIP_ARRAYS, Trips
@@ -233,7 +233,7 @@ def _written_or(value: Any, stand_in: type[_StandIn]) -> Any:
 
 def _need_pyarrow() -> None:
     if importlib.util.find_spec("pyarrow") is None:
-        raise MissingExtraError("saved runs need pyarrow: pip install 'minisim[parquet]'")
+        raise MissingExtraError(f"saved runs need pyarrow: {extra('parquet')}")
 
 
 def _digest(data: bytes) -> bytes:

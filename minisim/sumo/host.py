@@ -20,7 +20,15 @@ from typing import IO, NamedTuple
 from minisim.control import Command, Controller, View
 from minisim.engine.cruise.law import build_cruise
 from minisim.engine.state import build_layout, build_vehicles
-from minisim.errors import FileError, InputError, MissingExtraError, SumoError, choice, instance
+from minisim.errors import (
+    FileError,
+    InputError,
+    MissingExtraError,
+    SumoError,
+    choice,
+    extra,
+    instance,
+)
 from minisim.files import replacing
 from minisim.hosting import AFTERMATH, REACTIONS, Hosted, begin
 from minisim.laws import build_law
@@ -37,8 +45,6 @@ MODELS = tuple(model.sumo for model in CAR_FOLLOWING.values() if model.sumo)
 
 #: What the child writes on stderr.
 STDERR = "stderr.txt"
-
-INSTALL = "pip install 'minisim[sumo]'"
 
 #: What the child runs. The classes of its messages must belong to the module, not to `__main__`.
 CHILD = "from minisim.sumo.worker import main; main()"
@@ -158,7 +164,7 @@ def sumo_home() -> Path:
         found = importlib.util.find_spec(package)
         origin = found and found.origin
         if origin is None:
-            raise MissingExtraError(f"the host SUMO needs the package {package}: {INSTALL}")
+            raise MissingExtraError(f"the host SUMO needs the package {package}: {extra('sumo')}")
     return Path(str(origin)).parent  # importing it would change the environment
 
 

@@ -77,7 +77,8 @@ def sweep(
     seeds: Annotated[int | None, option("Seeds 1 … N per cell; the file's, or 10.", "N")] = None,
     jobs: options.Jobs = None,
     scheduler: Annotated[
-        str | None, option("Run on this Dask cluster (pip install 'minisim\\[dask]').", "ADDRESS")
+        str | None,
+        option("Run on a Dask cluster (pip install 'minisim-traffic\\[dask]').", "ADDRESS"),
     ] = None,
     export: Annotated[Path | None, option("One row per run (.csv or .parquet).", "FILE")] = None,
     horizon: Annotated[float | None, option("Simulated time; the file's, or 3600.", "S")] = None,

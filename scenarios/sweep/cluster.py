@@ -11,7 +11,7 @@ from concurrent.futures import Executor, Future
 from contextlib import contextmanager
 from typing import Any
 
-from minisim.errors import InputError, MissingExtraError, instance
+from minisim.errors import InputError, MissingExtraError, extra, instance
 from scenarios.sweep.keys import results_version
 
 #: The address of a scheduler; the protocols are Dask's.
@@ -37,7 +37,7 @@ def cluster(address: str, patience: float = PATIENCE) -> Iterator[Executor]:
     try:
         distributed: Any = importlib.import_module("distributed")
     except ImportError:
-        need = "--scheduler needs the package distributed: pip install 'minisim[dask]'"
+        need = f"--scheduler needs the package distributed: {extra('dask')}"
         raise MissingExtraError(need) from None
     # The sweep itself reports a lost connection in one line. Each logger has its own level.
     for name in list(logging.root.manager.loggerDict):

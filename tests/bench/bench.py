@@ -110,7 +110,7 @@ def _taste() -> Iterator[Figure]:
 def _rivals(runs: int, hour: Figure, signal: Figure) -> Iterator[Figure]:
     home = rivals.sumo_home()
     if home is None:
-        print("SUMO is not installed (pip install 'minisim[sumo]'): not compared")
+        print("SUMO is not installed (pip install 'minisim-traffic[sumo]'): not compared")
         return
     compared: list[tuple[str, str, Callable[[], float], Figure, float]] = [
         ("hosting", "libsumo hosting the same DIM / DIM", rivals.hosted_hour, hour, 200.0),

@@ -27,4 +27,4 @@ def test_without_hypothesis_the_error_says_what_to_install() -> None:
         "    print(error)\n"
     )
     told = python("-c", code).stdout
-    assert told == "strategies need hypothesis: pip install 'minisim[testing]'\n"
+    assert told == "strategies need hypothesis: pip install 'minisim-traffic[testing]'\n"

@@ -22,7 +22,7 @@ from tests.sumo.forking import Forked, forking
 
 NEEDED = ("libsumo", "sumo", "sumolib")
 MISSING = [name for name in NEEDED if importlib.util.find_spec(name) is None]
-REASON = f"{', '.join(MISSING)} not installed: pip install 'minisim[sumo]'"
+REASON = f"{', '.join(MISSING)} not installed: pip install 'minisim-traffic[sumo]'"
 
 
 def both(scenario: Any, controller: Controller, seed: int = 0, **options: Any) -> tuple[Run, Run]:

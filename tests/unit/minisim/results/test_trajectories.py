@@ -66,7 +66,7 @@ def test_trips_read_back_with_empty_cells_for_what_has_not_ended(run: Run, tmp_p
 
 def test_parquet_needs_pyarrow(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
-    with pytest.raises(MissingExtraError, match=r"pip install 'minisim\[parquet\]'"):
+    with pytest.raises(MissingExtraError, match=r"pip install 'minisim-traffic\[parquet\]'"):
         write_trips(run.trips, tmp_path / "trips.parquet")
     assert os.listdir(tmp_path) == []
 

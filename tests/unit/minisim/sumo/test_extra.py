@@ -12,7 +12,7 @@ from minisim.sumo import simulate
 from minisim.testing import check_controller, small_scenario
 from tests.builders import python
 
-INSTALL = r"needs the package \w+: pip install 'minisim\[sumo\]'"
+INSTALL = r"needs the package \w+: pip install 'minisim-traffic\[sumo\]'"
 
 
 @pytest.mark.parametrize("package", ["libsumo", "sumo"])
@@ -35,5 +35,5 @@ def test_the_rest_works_without_the_extra() -> None:
     )
     done = python("-c", code)
     assert done.returncode == 2
-    assert "pip install 'minisim[sumo]'" in done.stderr
+    assert "pip install 'minisim-traffic[sumo]'" in done.stderr
     assert done.stderr.count("\n") == 1, "one line"

@@ -119,7 +119,7 @@ def test_the_extra_is_named_where_it_is_missing(
     monkeypatch.setitem(sys.modules, "distributed", None)  # Python's own way to block an import
     store = tmp_path / "s.db"
     said = fails(capsys, "sweep", str(file), "--scheduler", "tcp://x:1", "--out", str(store))
-    assert "pip install 'minisim[dask]'" in said
+    assert "pip install 'minisim-traffic[dask]'" in said
     assert not store.exists()
 
 

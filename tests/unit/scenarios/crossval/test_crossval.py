@@ -387,5 +387,5 @@ def test_without_sumo_the_install_command_is_told(
 ) -> None:
     monkeypatch.setitem(sys.modules, "libsumo", None)
     said = fails(capsys, "crossval", "--out", str(tmp_path / "new"))
-    assert "pip install 'minisim[sumo]'" in said
+    assert "pip install 'minisim-traffic[sumo]'" in said
     assert list(tmp_path.iterdir()) == []
