@@ -24,7 +24,7 @@ KINDS: Mapping[str, str] = {
     "behind": "Vehicle {me} is behind {others} in its lane.",
     "crossing": "Vehicle {me} is crossing the junction.",
     "goes": "Vehicle {me} has the right of way.",
-    "advised": "Vehicle {me} has the right of way, and is told to drive at {note} at most.",
+    "advised": "Vehicle {me} is told to drive at {note} at most.",
     "clique goes": "Vehicle {me} has the right of way with its clique, {clique}. {note}",
     "committed": "Vehicle {me} can no longer stop before the junction, so it goes on.",
     "held": "Vehicle {me} does not have the right of way.",

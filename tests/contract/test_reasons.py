@@ -14,10 +14,11 @@ from minisim.channel import Channel
 from minisim.control import Controller, Observed, can_stop
 from minisim.junction.movements import ARM_NAMES, Movement
 from minisim.link import Linked
-from minisim.reasons import KINDS, Reason
+from minisim.reasons import KINDS, Explaining, Reason, Signalling
 from minisim.results.run import Run
 from minisim.sumo import simulate as simulate_in_sumo
 from scenarios import five_way, four_way, three_way
+from scenarios.controllers import CONTROLLERS as TABLE
 from scenarios.controllers import controller_named, safe
 from tests.builders import digest, seen
 
@@ -178,6 +179,16 @@ def test_reasons_agree_with_the_trajectories(controller: Controller) -> None:
 
 
 FAILING = Channel(latency=0.2, jitter=0.1, loss=0.2)
+
+
+#: Of these, only what they command is known.
+SILENT = {"dim-as-run", "v2ic-as-run", "unregulated"}
+
+
+@pytest.mark.parametrize("name", [name for name in TABLE if name not in SILENT])
+def test_each_controller_says_why_or_shows_heads(name: str) -> None:
+    session = controller_named(name).start(four_way(100).site(0))
+    assert isinstance(session, Explaining | Signalling)
 
 
 @pytest.mark.parametrize("name", ["v2ic", "reservation", "slots"])
