@@ -8,7 +8,8 @@ from minisim.parameters import declared, part, word
 
 #: Which vehicles may enter while others cross. "clear": none (the paper). "harmonious" (ours): a
 #: participant in harmony with all that cross, except those of its own lane, which it follows.
-GATES = ("clear", "harmonious")
+#: "passed" (ours): likewise, but a vehicle inside no longer counts for those whose way it has left.
+GATES = ("clear", "harmonious", "passed")
 
 
 @declared
@@ -57,6 +58,6 @@ class Agent:
             if rules.gate == "clear":
                 return self.right_of_way
         if self.vehicle in percept.participants:
-            lanes = table.surely(percept.case, percept.unknown, percept.occupied)
+            lanes = table.surely(*percept.asked)
             self.right_of_way = bool(lanes >> self.lane & 1)
         return self.right_of_way

@@ -10,6 +10,8 @@ suffice because between them no agent would change its mind:
   stop. The gate "clear" then freezes the decision. Under "harmonious" the choice among the rest
   stays the same: without the vehicle that went, the best clique is the best among the movements in
   harmony with it, since cliques are compared by the smallest lane rank that only one of them has.
+  Under "passed" a vehicle inside may leave the way of one that waits at any time: as long as one
+  waits while others cross, the session looks every step.
 - A vehicle stops crossing when its rear bumper leaves the junction (a wake-up).
 
 There are four exceptions:
@@ -26,13 +28,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any, Literal, TypeAlias
 
 from dim.agent import GATES, Agent, Rules
 from dim.decision import ORDERS, DecisionTable, decision_table, lane_ranks
 from dim.harmony import HarmonyMatrix
 from dim.monitor import Monitor
+from dim.passing import Passing
 from dim.perception import COMMITS, ROUNDING, ExactPerception, Perception, Reader
 from dim.priorities import CHANGING, SENSOR_RANGE, TURN_TIME, ranking_of, rotating
 from dim.reasons import Reasons, reasons_of
@@ -65,7 +68,8 @@ def _priorities(title: str, value: Any) -> Any:
 class Dim:
     """Vehicles that decide alone, by the paper's rules or ours.
 
-    `gate="harmonious"`, priorities other than the lanes' own order, and the monitor are ours.
+    The gates "harmonious" and "passed", priorities other than the lanes' own order, and the
+    monitor are ours.
     """
 
     name = Name("dim")
@@ -80,8 +84,9 @@ class Dim:
         COMMITS, default="stoppable", label="commit rule",
     )  # fmt: skip
     gate: str = word(
-        "which vehicles may enter while others cross: none (the paper), or those in harmony with "
-        "all of them; vehicles of one lane just follow each other",
+        "which vehicles may enter while others cross: none (the paper), those in harmony with all "
+        "of them, or those in whose way none is any more; vehicles of one lane just follow each "
+        "other",
         GATES, default="clear",
     )  # fmt: skip
     priorities: Takes[tuple[int, ...] | _Word | None, Iterable[int] | _Word | None] = checked(
@@ -180,6 +185,16 @@ def _rests(dim: Dim, looks: float | None, takes: object) -> bool:
 _plan = lru_cache(maxsize=256)(Plan)
 
 
+def _taken(
+    takes: Callable[[View, View], View],
+    see: Callable[[View, Observed], View],
+    view: View,
+    ego: Observed,
+) -> View:
+    """What a vehicle makes of what it sees. (No closure: a fork copies the state of both.)"""
+    return takes(view, see(view, ego))
+
+
 class DimSession:
     """One run of DIM: hosts an agent for each vehicle that takes part and that `follows` DIM.
 
@@ -204,9 +219,10 @@ class DimSession:
         table = decision_table(rules, dim.order, dim.ranks(site))
         self.rules = Rules(table, dim.gate, dim.commit)  #: those in force at the next look
         brakes = tuple(it.deceleration for it in site.types)
-        self.reader = Reader(site.intersection.n, zones, brakes, dim.commit, rules.types)
+        passing = Passing(rules, site) if dim.gate == "passed" else None
+        self.reader = Reader(site.intersection.n, zones, brakes, dim.commit, rules.types, passing)
         half_green = (zones.green / 2.0,) if dim.commit == "paper" else ()
-        entry = (0.0,) if dim.gate == "harmonious" else ()
+        entry = () if dim.gate == "clear" else (0.0,)
         looks = dim.perception.period
         self.plan = _plan(
             hold_distance=zones.green,
@@ -221,7 +237,7 @@ class DimSession:
         self._start = zones.yellow_start + ROUNDING
         self._ranks = ranking_of(dim.priorities, site, zones, dim.turn_time, dim.sensor_range)
         see = dim.perception.start(site)
-        self.see = see if takes is None else lambda view, ego: takes(view, see(view, ego))
+        self.see = see if takes is None else partial(_taken, takes, see)
         self._monitors = dim.monitor.start(site, matrix, self._start) if dim.monitor else None
         self._dt, self._follows, self._takes = site.dt, follows, takes
         self._agents: dict[int, Agent] = {}
@@ -241,6 +257,7 @@ class DimSession:
         commands: list[Command] = []
         agents: dict[int, Agent] = {}  # those that left the view are forgotten
         look_again = waiting = False
+        passed = self.reader.passing is not None
         table, until = self.table(view)
         seen = percept = None
         sights: dict[int, View] = {}
@@ -262,7 +279,9 @@ class DimSession:
                 commands.append(Go(vehicle) if goes else Hold(vehicle))
             if not goes:
                 look_again |= vehicle in percept.crossing
-                waiting |= vehicle in percept.participants
+                takes_part = vehicle in percept.participants
+                waiting |= takes_part
+                look_again |= takes_part and passed and bool(percept.crossing)
         self._agents, self._sights, self._table = agents, sights, table
         going = {vehicle for vehicle, agent in agents.items() if agent.right_of_way}
         if self._monitors is not None:

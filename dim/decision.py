@@ -103,12 +103,13 @@ class DecisionTable:
     Attributes:
         matrix, order, priorities: what the table was made from, as in `decide`.
         lanes: case -> lanes with the right of way; the case is not checked.
-        admitted: (case, crossing) -> the case without the participants that conflict with any
-            movement in `crossing` (bit k for the k-th). Movements of one lane follow each other
-            and are not in conflict.
-        surely: (case, unknown, crossing) -> of the lanes that `crossing` admits, those that have
-            the right of way whatever the participants on the lanes in `unknown` do (bit i for lane
-            i; with types, Σ (1 + type)·(1 + types)^lane); the case leaves these participants out.
+        admitted: (case, crossing, barred) -> the case without the participants that conflict with
+            any movement in `crossing` (bit k for the k-th), or whose own is in `barred` (default
+            none). Movements of one lane follow each other and are not in conflict.
+        surely: (case, unknown, crossing, barred) -> of the lanes that are admitted, those that
+            have the right of way whatever the participants on the lanes in `unknown` do (bit i for
+            lane i; with types, Σ (1 + type)·(1 + types)^lane); the case leaves these participants
+            out.
 
     Raises `InputError`: unknown order, or priorities that are not a permutation of the lanes.
     """
@@ -164,16 +165,17 @@ class DecisionTable:
         chosen = decide(self.participants(case), self.matrix, self.order, self.priorities)
         return sum(1 << m.origin for m in chosen)
 
-    def _admit(self, case: int, crossing: int) -> int:
+    def _admit(self, case: int, crossing: int, barred: int = 0) -> int:
         matrix = self.matrix
         occupied = [m for k, m in enumerate(matrix.movements) if crossing >> k & 1]
         return self.case(
             m
             for m in self.participants(case)
-            if all(m.origin == other.origin or matrix.harmony(m, other) for other in occupied)
+            if not barred >> matrix.index(m) & 1
+            and all(m.origin == other.origin or matrix.harmony(m, other) for other in occupied)
         )
 
-    def _agree(self, case: int, unknown: int, crossing: int) -> int:
+    def _agree(self, case: int, unknown: int, crossing: int, barred: int = 0) -> int:
         turns, base = self.matrix.n - 1, self.matrix.types + 1
         kinds = ((lane, unknown // base**lane % base) for lane in range(self.matrix.n))
         options = [
@@ -181,7 +183,7 @@ class DecisionTable:
             for lane, k in kinds if k
         ]  # fmt: skip
         possible = (case + sum(several) for several in product(*options))
-        return reduce(and_, (self.lanes(self.admitted(c, crossing)) for c in possible))
+        return reduce(and_, (self.lanes(self.admitted(c, crossing, barred)) for c in possible))
 
 
 @lru_cache(maxsize=1024)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple, Protocol, runtime_checkable
 
+from dim.passing import Passing
 from dim.zones import Zones
 from minisim.control import Observed, Site, View, can_stop
 from minisim.junction.movements import Movement, movements_of
@@ -71,6 +72,14 @@ class Percept(NamedTuple):
     #: Lanes of participants with `UNKNOWN` intent, which are not in the case; bit i for lane i, or
     #: as `DecisionTable.surely` has it.
     unknown: int = 0
+    #: Movements that may not enter, bit k for the k-th, since vehicles inside that have left some
+    #: ways, and are not in `occupied`, are still in theirs (gate "passed").
+    barred: int = 0
+
+    @property
+    def asked(self) -> tuple[int, int, int, int]:
+        """What the decision depends on, as `DecisionTable.surely` takes it."""
+        return self.case, self.unknown, self.occupied, self.barred
 
 
 class Reader(NamedTuple):
@@ -81,6 +90,7 @@ class Reader(NamedTuple):
     decelerations: tuple[float, ...]  # comfortable braking of each type [m/s²]
     commit: str
     types: int = 1  # those that the harmony matrix tells apart
+    passing: Passing | None = None  # where vehicles leave others' ways, if the gate asks
 
     def committed(self, vehicle: Observed) -> bool:
         """Whether others must treat a vehicle before the junction as crossing.
@@ -102,7 +112,7 @@ class Reader(NamedTuple):
         movements, base = movements_of(n), movements_of(n, types).choices + 1
         bits, kind = movements.bits, 0
         participants, crossing = [], []
-        case = occupied = unknown = 0
+        case = occupied = unknown = barred = 0
         lane_served = -1
         for vehicle in view.vehicles:
             if vehicle.distance > start:
@@ -115,6 +125,9 @@ class Reader(NamedTuple):
                 lane_served = lane
             if distance < 0.0 or self.committed(vehicle):
                 crossing.append(vehicle.id)
+                if self.passing and distance < 0.0 and manoeuvre != UNKNOWN:
+                    barred |= self.passing.bars(vehicle)
+                    continue
                 occupied |= bits[lane][manoeuvre] << kind * len(movements)
             elif front:
                 participants.append(vehicle.id)
@@ -122,4 +135,4 @@ class Reader(NamedTuple):
                     unknown += (kind + 1) * (types + 1) ** lane
                 else:
                     case += (movements.typed(kind, manoeuvre) if kind else manoeuvre) * base**lane
-        return Percept(tuple(participants), tuple(crossing), case, occupied, unknown)
+        return Percept(tuple(participants), tuple(crossing), case, occupied, unknown, barred)

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
+from functools import partial
 from typing import Any, NamedTuple
 
 from dim.perception import ROUNDING
@@ -108,7 +109,13 @@ def ranking_of(
     if priorities == "waiting":
         memory = memory_of(site, zones, sensor_range)
         passing = PassingTimes(zones.yellow_start + ROUNDING)
-        return lambda view: longest_waiting(
-            view.time, n, passing.look(view.time, view.vehicles), memory, turn_time
-        )
+        return partial(_by_waiting, passing, n, memory, turn_time)
     return None
+
+
+def _by_waiting(
+    passing: PassingTimes, n: int, memory: float, turn_time: float, view: View
+) -> Ranking:
+    """The ranks by waiting. (No closure: a fork copies the passing times.)"""
+    fronts = passing.look(view.time, view.vehicles)
+    return longest_waiting(view.time, n, fronts, memory, turn_time)

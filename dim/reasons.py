@@ -34,7 +34,7 @@ class Reasons:
         if crossing and self._gate == "clear":
             inside = tuple(v.id for v in crossing)
             return Reason("not clear", me.id, inside)
-        against = tuple(v.id for v in crossing if v.lane != me.lane and self._conflict(me, v))
+        against = tuple(v.id for v in crossing if v.lane != me.lane and self._in_way(me, v))
         if against:
             return Reason("not in harmony", me.id, against)
         return self._chosen(me, percept, [seen[vehicle] for vehicle in percept.participants])
@@ -43,7 +43,7 @@ class Reasons:
         stops = can_stop(me, self._reader.decelerations[me.type])
         if not stops:
             return Reason("committed", me.id)
-        lanes = self._table.surely(percept.case, percept.unknown, percept.occupied)
+        lanes = self._table.surely(*percept.asked)
         clique = self._names(percept, lanes)
         if percept.crossing or str(self._reader.typed(me)) not in clique:
             return Reason("goes", me.id)
@@ -51,7 +51,7 @@ class Reasons:
 
     def _chosen(self, me: Observed, percept: Percept, participants: list[Observed]) -> Reason:
         """Why it is not among those that may go, although no crossing vehicle is in its way."""
-        lanes = self._table.surely(percept.case, percept.unknown, percept.occupied)
+        lanes = self._table.surely(*percept.asked)
         if lanes >> me.lane & 1:
             return Reason("looks again", me.id)
         if percept.unknown:
@@ -64,7 +64,7 @@ class Reasons:
 
     def _admitted(self, percept: Percept) -> tuple[Movement, ...]:
         table = self._table
-        return table.participants(table.admitted(percept.case, percept.occupied))
+        return table.participants(table.admitted(percept.case, percept.occupied, percept.barred))
 
     def _names(self, percept: Percept, lanes: int) -> tuple[str, ...]:
         return tuple(str(m) for m in self._admitted(percept) if lanes >> m.origin & 1)
@@ -75,6 +75,13 @@ class Reasons:
         if percept.unknown or not movements:
             return ""
         return explain(movements, table.matrix, table.order, table.priorities).reason
+
+    def _in_way(self, me: Observed, other: Observed) -> bool:
+        """Whether one that crosses bars another's movement."""
+        passing = self._reader.passing
+        if passing is None or other.distance >= 0.0 or not (me.manoeuvre and other.manoeuvre):
+            return self._conflict(me, other)
+        return bool(passing.bars(other) >> self._table.matrix.index(self._reader.typed(me)) & 1)
 
     def _conflict(self, one: Observed, other: Observed) -> bool:
         """Whether their movements are not in harmony; one that is not known may be anything."""

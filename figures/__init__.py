@@ -1,8 +1,21 @@
-"""Figures and animations of decisions, runs and results: the only package that draws."""
+"""Figures and animations of decisions, runs and results: the only package that draws.
+
+All figures show themselves in a notebook.
+"""
 
 from figures.demo import performance_figure
-from figures.film.animate import write_animation
-from figures.junction.decision import decision_figure
+from figures.film.animate import animation, write_animation
+from figures.junction.decision import decision_figure as decision
+from figures.runs import cumulative, queues, time_space
 from figures.style import save
 
-__all__ = ["decision_figure", "performance_figure", "save", "write_animation"]
+__all__ = [
+    "animation",
+    "cumulative",
+    "decision",
+    "performance_figure",
+    "queues",
+    "save",
+    "time_space",
+    "write_animation",
+]

@@ -7,9 +7,10 @@ state, a display or another program's figures.
 
 from __future__ import annotations
 
+import io
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
@@ -32,6 +33,21 @@ GRASS, ASPHALT, PAINT = "#EEF2E8", "#C9CED6", "#FFFFFF"
 ZONES = {"red": "#DE856F", "yellow": "#FAE089", "green": "#BEEDC2"}
 #: Vehicles by their state.
 RIGHT_OF_WAY, WAITING, FREE = BLUE, VERMILLION, "#5C6470"
+
+
+class Head(NamedTuple):
+    """How a state of a signal head is drawn: shapes and widths tell them apart without colour."""
+
+    colour: str
+    width: float  #: of its hold line [pt]
+    marker: str
+
+
+#: Signal heads by what they show.
+HEADS = {
+    "green": Head(GREEN, 6.5, "o"), "amber": Head(ORANGE, 4.0, "^"),
+    "red": Head("#A4161A", 1.8, "s"),
+}  # fmt: skip
 
 #: Colours by their names in the table of controllers.
 COLOURS = {
@@ -59,9 +75,18 @@ def look(series: str) -> Look:
     return known._replace(colour=COLOURS[known.colour])
 
 
+class ShownFigure(Figure):
+    """A figure that shows itself in a notebook, without pyplot or magic words."""
+
+    def _repr_png_(self) -> bytes:
+        buffer = io.BytesIO()
+        self.savefig(buffer, format="png")
+        return buffer.getvalue()
+
+
 def new_figure(width: float, height: float, *, dpi: float = 150) -> Figure:
     """An empty figure of width × height inches on white paper."""
-    return Figure(figsize=(width, height), dpi=dpi, facecolor=PAPER)
+    return ShownFigure(figsize=(width, height), dpi=dpi, facecolor=PAPER)
 
 
 def write(

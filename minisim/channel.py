@@ -42,11 +42,17 @@ class Channel:
         return "".join(f"+{name}={value:g}" for name, value in faults.items() if value)
 
 
-def chances(seed: int) -> Iterator[float]:
-    """Random numbers from [0, 1) for the messages of a run, without end."""
-    random = stream(seed, "messages")
-    while True:
-        yield from random.random(1024).tolist()
+class Chances(Iterator[float]):
+    """Random numbers from [0, 1) for the messages of a run, without end; it can be copied."""
+
+    def __init__(self, seed: int) -> None:
+        self._random = stream(seed, "messages")
+        self._drawn: list[float] = []  # last first
+
+    def __next__(self) -> float:
+        if not self._drawn:
+            self._drawn = self._random.random(1024)[::-1].tolist()
+        return self._drawn.pop()
 
 
 class Air(Generic[_T]):

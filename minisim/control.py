@@ -222,6 +222,10 @@ class Report(NamedTuple):
     holds: bool  # whether the vehicle then had the right of way
 
 
+#: If no message fails.
+NO_REPORTS: Mapping[int, Report] = MappingProxyType({})
+
+
 class View(NamedTuple):
     """What the session is shown at a wake-up.
 
@@ -234,7 +238,7 @@ class View(NamedTuple):
 
     time: float  # [s]
     vehicles: tuple[Observed, ...]  # by lane, then front to back
-    reports: Mapping[int, Report] = MappingProxyType({})  # by vehicle; empty if no message fails
+    reports: Mapping[int, Report] = NO_REPORTS  # by vehicle; empty if no message fails
 
 
 @dataclass(frozen=True, slots=True)
@@ -519,11 +523,32 @@ class Unregulated:
 
     def start(self, site: Site) -> Session:  # noqa: ARG002  (Controller's argument)
         """Open every lane, for good."""
-        return _UnregulatedSession()
+        return _Silent(Plan(lanes_open=True))
 
 
-class _UnregulatedSession:
-    plan = Plan(lanes_open=True)
+@dataclass(frozen=True)
+class External:
+    """Decides nothing itself: all commands come from outside (`Simulation.command`).
+
+    `plan` says when `Simulation.run_until("wake")` returns and what `Simulation.view` shows.
+    """
+
+    plan: Plan = Plan()  # noqa: RUF009  (frozen)
+
+    name = Name("external")
+    covers = NOTHING
+
+    def __post_init__(self) -> None:
+        instance("plan", self.plan, Plan)
+
+    def start(self, site: Site) -> Session:  # noqa: ARG002  (Controller's argument)
+        """Begin a run in which every vehicle is held until a command lets it go."""
+        return _Silent(self.plan)
+
+
+@dataclass(frozen=True)
+class _Silent:
+    plan: Plan
 
     def decide(self, view: View) -> tuple[Command, ...]:  # noqa: ARG002  (Session's argument)
         return ()

@@ -130,18 +130,25 @@ class Hosted:
             self.exchange["shown"] += len(view.vehicles)
             if 0.0 < view.time <= self.scenario.warmup and keeps(self.session, Counting):
                 self.before.update(self.session.counts)
-            for command in commands:
-                check_command(command, tick, self.site, len(self.arrivals))
-                self.exchange[type(command).__name__] += 1
+            self.take(commands, tick)
             if view.time < self.scenario.warmup:
                 self.exchange.clear()
                 self.times.clear()
             if self.witness is not None:
-                self.witness.note(commands)
                 self.witness.look(view)
         except (Exception, SystemExit) as error:  # a caller's code may raise anything
             raise _blame(self.controller, error, self.session, f" at {view.time:.1f} s") from error
         return commands
+
+    def take(self, commands: Sequence[Command], tick: int) -> None:
+        """Check commands and count them; raises `InputError` for one that cannot be carried out."""
+        for command in commands:
+            check_command(command, tick, self.site, len(self.arrivals))
+        if time_of(tick, self.site.dt) >= self.scenario.warmup:
+            for command in commands:
+                self.exchange[type(command).__name__] += 1
+        if self.witness is not None:
+            self.witness.note(commands)
 
     def look(self, view: View) -> None:
         """Write down the reasons at the time of a view; `ControllerError` as `ask` raises."""

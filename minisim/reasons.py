@@ -54,15 +54,15 @@ KINDS: Mapping[str, str] = {
     "told for later": "Vehicle {me} has a passage, and the right of way from {until} on.",
     "in doubt": "Vehicle {me} waits until it is known that {others} {no_longer} the right of way.",
     "monitor": "Vehicle {me} is braked by its safety monitor for {others}.",
-    "red": "Vehicle {me} waits at a red signal{head}.",
-    "amber": "Vehicle {me} stops at an amber signal{head}.",
+    "red": "Vehicle {me} waits: its signal has been red{head}.",
+    "amber": "Vehicle {me} stops: its signal has been amber{head}.",
     "gap": (
         "Vehicle {me} has a green signal, but waits for a gap: {others} {cross} on a way that "
         "conflicts."
     ),
     "approaching": "Vehicle {me} must first stand at the line.",
-    "reaction": "Vehicle {me} has stopped and looks; it may go from {until} on.",
-    "gap too short": (
+    "reaction": "Vehicle {me} has stopped and looks; it cannot go before {until}.",
+    "others first": (
         "The driver of vehicle {me} waits for {others}, which came earlier or {cross} in its way."
     ),
     "turn": "Vehicle {me} waits for its turn: {others} came first.",
@@ -93,8 +93,8 @@ class Reason:
     def sentence(self) -> str:
         """The reason in plain words."""
         one = len(self.vehicles) == 1
-        head = "" if self.since is None else f": it turned {self.kind} at {self.since:.1f} s"
-        head += "" if self.until is None else f", and turns green at {self.until:.1f} s"
+        head = "" if self.since is None else f" since {self.since:.1f} s"
+        head += "" if self.until is None else f"; it turns green at {self.until:.1f} s"
         return KINDS[self.kind].format(
             me=self.vehicle, others=_listed(self.vehicles), clique=" ".join(self.clique),
             since="?" if self.since is None else f"{self.since:.1f} s",

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from copy import deepcopy
 from functools import partial
 
 import numpy as np
 
 from minisim.control import (
+    NO_REPORTS,
     Advise,
     Brake,
     Close,
@@ -35,7 +37,7 @@ from minisim.engine.state import (
     build_layout,
     build_vehicles,
 )
-from minisim.errors import InputError, number
+from minisim.errors import InputError, choice, number
 from minisim.hosting import AFTERMATH, REACTIONS, Alarm, Hosted, begin
 from minisim.jit import direct
 from minisim.laws import build_law
@@ -46,6 +48,10 @@ from minisim.vehicle import CruiseVehicle
 
 #: `Observed._make` without its check of the number of fields, which `OBSERVED` guarantees.
 _as_observed: Callable[[Iterable[float]], Observed] = partial(tuple.__new__, Observed)
+
+
+#: Of `Simulation.run_until`.
+EVENTS = ("wake", "collision")
 
 
 class Simulation:
@@ -105,6 +111,7 @@ class Simulation:
         self._horizon_tick = first_tick(scenario.horizon, self.site.dt)
         self._alarm = Alarm(plan.period, self.site.dt)
         self._stride = 1 if explain else NEVER  # most steps between two looks for reasons
+        self._given: list[tuple[int, tuple[Command, ...]]] = []  # commands from outside, by tick
         self._started = False
         self._done = False
         self.tick = 0
@@ -132,17 +139,86 @@ class Simulation:
             ControllerError: the controller answered with something that is not a command.
         """
         until = number("until [s]", until, low=0)
-        target = min(first_tick(until, self.site.dt), self._horizon_tick)
-        if not self._started:
-            self._started = True
-            self._decide()
+        for _ in self._stretches(first_tick(until, self.site.dt)):
+            pass
+
+    def run_until(self, event: float | str | Callable[[Simulation], bool]) -> bool:
+        """Advance until something happens, or to the end of the run.
+
+        Args:
+            event: a time [s]; "wake", whenever the plan wakes the session, first at time 0;
+                "collision", when one is recorded; or a function that is asked after each step.
+
+        Returns:
+            Whether it happened. If not, the run is over.
+
+        Raises:
+            InputError: no such event.
+            CollisionError, ControllerError: as `advance` raises them.
+        """
+        if not isinstance(event, str) and not callable(event):
+            self.advance(event)
+            return self.tick >= first_tick(event, self.site.dt)
+        by_step, before = callable(event), len(self._collisions)
+        if isinstance(event, str):
+            choice("event", event, EVENTS)
+        for woken in self._stretches(self._horizon_tick, 1 if by_step else NEVER):
+            if callable(event):
+                happened = event(self)
+            else:
+                happened = woken if event == "wake" else len(self._collisions) > before
+            if happened:
+                return True
+        return False
+
+    def command(self, *commands: Command) -> None:
+        """Carry out commands from outside; what is set at a time acts from the next step on.
+
+        If the session is woken at the same time, it has decided before, so these count.
+
+        Raises:
+            InputError: one of them cannot be carried out; then none is.
+        """
+        self._hosted.take(commands, self.tick)
+        self._begin()
+        self._given.append((self.tick, commands))
+        for command in commands:
+            self._apply(command)
+
+    def fork(self) -> Simulation:
+        """A copy that goes on by itself: left alone, both give identical trips.
+
+        It shares what no run changes (scenario, controller, site, arrivals) and copies the rest,
+        the session with its random streams included. What a session keeps must be in attributes: a
+        closure or a generator cannot be copied.
+        """
+        hosted = self._hosted
+        shared = (
+            hosted.scenario, hosted.controller, hosted.arrivals, hosted.plan,
+            self.site, self._layout, self._law, NO_REPORTS,
+        )  # fmt: skip
+        return deepcopy(self, {id(it): it for it in shared})
+
+    def _begin(self) -> bool:
+        """Ask the session for the first time; returns whether it is now."""
+        if self._started:
+            return False
+        self._started = True
+        self._decide()
+        return True
+
+    def _stretches(self, target: int, most: int = NEVER) -> Iterator[bool]:
+        """Advance, at most `most` steps at once; yields each time whether the session was woken."""
+        if self._begin():
+            yield True
+        target = min(target, self._horizon_tick)
         world = *self._pack, self._vehicles, self._lanes, self._layout, self._law, self._cruise
         scratch = self._trace, self._bodies, self._observed
         step = direct(
             kernel.advance, self._cruise is None, (*world, *scratch, self._traced, self.tick, 0)
         )
         while self.tick < target and not self._done:
-            end = min(target, self._alarm.tick, self.tick + self._stride)
+            end = min(target, self._alarm.tick, self.tick + min(most, self._stride))
             self.tick, reasons, self._traced, self._seen = step(
                 *world, *scratch, self._traced, self.tick, end
             )
@@ -151,10 +227,12 @@ class Simulation:
             if reasons & (kernel.TOUCH | kernel.GAP):
                 self._check_collisions()
             self._done = bool(reasons & kernel.DONE)
-            if self.tick >= self._alarm.tick or reasons & (MARKED | CLEAR):
+            woken = self.tick >= self._alarm.tick or bool(reasons & (MARKED | CLEAR))
+            if woken:
                 self._decide()
             elif self._hosted.witness is not None:
                 self._hosted.look(self.view())
+            yield woken
 
     def run(self) -> Run:
         """Advance to the end and return the result."""
@@ -162,7 +240,7 @@ class Simulation:
         return self.result()
 
     def view(self) -> View:
-        """What a session would be shown now."""
+        """What a session would be shown now; steps change it, commands do not."""
         return View(self.time, tuple(map(_as_observed, self._observed[: self._seen].tolist())))
 
     def result(self) -> Run:
@@ -176,6 +254,7 @@ class Simulation:
             columns=collect_trips(self._vehicles[self._row], demand, movements, self.site.dt, end),
             trace=np.concatenate([*self._traces, self._trace[:0]]),
             rows=self._vehicles[["id", "path", "type"]].copy(),
+            given=tuple(self._given),
         )
 
     def _decide(self) -> None:
@@ -206,7 +285,7 @@ class Simulation:
         new = {it.vehicles: it for it in now if it.vehicles not in self._collisions}
         self._collisions |= new
         if new and self._hosted.on_collision == "stop":
-            replay = partial(_replay, self._hosted, self.time)
+            replay = partial(_replay, self._hosted, tuple(self._given), self.time)
             raise self._hosted.collided(list(new.values()), replay)
 
     def _keep_trace(self) -> None:
@@ -214,8 +293,16 @@ class Simulation:
         self._traced = 0
 
 
-def _replay(hosted: Hosted, time: float, seconds: float = 10.0) -> Run:
-    """Run again until shortly after `time`; record the last `seconds` before it."""
+def _replay(
+    hosted: Hosted,
+    given: tuple[tuple[int, tuple[Command, ...]], ...],
+    time: float,
+    seconds: float = 10.0,
+) -> Run:
+    """Run again until shortly after `time`; record the last `seconds` before it.
+
+    Commands `given` from outside are given again at their ticks.
+    """
     again = Simulation(
         hosted.scenario,
         hosted.controller,
@@ -224,6 +311,9 @@ def _replay(hosted: Hosted, time: float, seconds: float = 10.0) -> Run:
         record_window=(max(0.0, time - seconds), math.inf),
         on_collision="record",
     )
+    for tick, commands in given:
+        again.advance(time_of(tick, again.site.dt))
+        again.command(*commands)
     again.advance(time + AFTERMATH)
     return again.result()
 

@@ -71,6 +71,7 @@ CONTROLLERS: Mapping[str, Entry] = MappingProxyType({
         Entry("dim", "dim:Dim", (
             Variant("", Look("DIM", "blue", "o", "-"), rival=True),
             Variant("gate=harmonious", Look("DIM, harmonious gate", "sky", "p", "-"), rival=True),
+            Variant("gate=passed", Look("DIM, gate passed", "ink", "<", "-")),
             Variant("order=lanes", Look("DIM, lanes first", "green", ">", "--")),
             Variant("priorities=rotating", Look("DIM, rotating priority", "vermillion", "P", "--")),
             Variant("priorities=waiting", Look("DIM, longest-waiting priority", "green", "*", ":")),

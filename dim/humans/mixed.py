@@ -69,16 +69,20 @@ class MixedSession:
         drivers = self._drivers = Drivers(mixed.share, site.seed)
         readings = Readings(mixed.humans, site, drivers)
         queue = self._queue = Queue(mixed.dim.zones, drivers)
-        self._dim = DimSession(
-            mixed.dim, site, lambda v: not queue.is_human(v), lambda *views: courtesy(*views)
-        )
+        self._dim = DimSession(mixed.dim, site, self._follows, self._takes)
         rules = self._dim.rules
         exact = mixed.dim.perception.period is None
-        courtesy = Courtesy(mixed.trust, readings, rules.table.matrix, queue, exact)
+        self._courtesy = Courtesy(mixed.trust, readings, rules.table.matrix, queue, exact)
         self._rules = rules, replace(rules, gate="harmonious")
         self._people = _People(mixed.humans, site, readings, queue)
         marks = dict.fromkeys((*self._dim.plan.marks, 0.0))  # at the entry another becomes first
         self.plan: Plan = replace(self._dim.plan, marks=tuple(marks))
+
+    def _follows(self, vehicle: Observed) -> bool:
+        return not self._queue.is_human(vehicle)
+
+    def _takes(self, view: View, seen: View) -> View:
+        return self._courtesy(view, seen)
 
     def kind(self, lane: int, rank: int) -> str:
         """ "human" or "automated"."""
@@ -148,7 +152,7 @@ class _People:
         if not self._is_ready(me, now):
             return Reason("reaction", me.id, until=self._ready_at(me))
         blocking = self._in_the_way(me, there)
-        return Reason("gap too short" if blocking else "looks again", me.id, blocking)
+        return Reason("others first" if blocking else "looks again", me.id, blocking)
 
     def _is_ready(self, vehicle: Observed, now: float) -> bool:
         """Whether the reaction and follow-up times are over, to within half a step."""

@@ -92,7 +92,22 @@ class CheckedSession:
             raise ConformanceError(f"at {view.time:.1f} s vehicle {vehicle} entered unseen")
         for lane in sorted(fronts.keys() - {k for k, f in enumerate(self.state.fronts) if f}):
             self._take(view, Event("arrive", *typed(fronts[lane])))
+        self._pass([v for v in near if v.distance < 0.0], view)
         self._fronts = {lane: v.id for lane, v in fronts.items()}
+
+    def _pass(self, inside: Iterable[Observed], view: View) -> None:
+        """Note whose way all on a movement have left since the last view."""
+        reader, protocol = self._session.reader, self.protocol
+        if reader.passing is None:
+            return
+        barred: dict[int, int] = {}
+        for vehicle in inside:
+            k = protocol.matrix.index(reader.typed(vehicle))
+            barred[k] = barred.get(k, 0) | reader.passing.bars(vehicle)
+        for k, still in barred.items():
+            for event, _ in list(protocol.passes(self.state, k)):
+                if not still >> event.foe & 1:
+                    self._take(view, event)
 
     def _move(self, view: View, vehicle: Observed) -> None:
         """Move on a front vehicle that is still before the junction."""

@@ -182,7 +182,7 @@ def is_fair(protocol: Protocol, steps: Steps) -> bool:
     if protocol.priorities == "rotating" and TURN not in events and all(s.decided for s in states):
         return False
     moving = {event.lane for event in events if event.what in ("roll", "commit", "enter")}
-    passing = {event[1:] for event in events if event.what in ("enter", "leave")}
+    passing = {event[1:3] for event in events if event.what in ("enter", "leave")}
     able = set(range(protocol.matrix.n))
     inside = -1
     for state in states:

@@ -52,16 +52,19 @@ class State(NamedTuple):
     inside: int = 0  # movements in the junction, bit k for the k-th one
     turn: int = 0  # "rotating" only: the lane whose turn it is
     decided: bool = False  # "rotating" only: whether there was a decision in this turn
+    passed: int = 0  # gate "passed" only: bit k·m + j if all inside on k have left the way of j
     came: tuple[int, ...] = ()  # "waiting" only: lanes with a front vehicle, in order of arrival
 
 
 class Event(NamedTuple):
     """What happens between two states: "arrive", "roll", "commit", "slow", "enter" or "leave" for a
-    movement; "look" for all vehicles; "turn" for the rotating priority."""
+    movement; "pass" for a movement and a foe whose way it leaves; "look" for all vehicles; "turn"
+    for the rotating priority."""
 
     what: str
     lane: int = -1
     manoeuvre: int = 0
+    foe: int = -1
 
     def __str__(self) -> str:
         return f"{self.what} {Movement(self.lane, self.manoeuvre)}" if self.manoeuvre else self.what
@@ -133,31 +136,60 @@ class Protocol:
                 after = self._put(state, lane, Front(manoeuvre, COMMITTED, goes))
                 yield Event("commit", lane, manoeuvre), after
             elif phase == COMMITTED and goes:
-                yield Event("enter", lane, manoeuvre), self._enter(state, lane, manoeuvre)
+                yield Event("enter", lane, manoeuvre), self.entered(state, lane, manoeuvre)
                 if not paper:  # behind a slow vehicle it may become able to stop again
                     after = self._put(state, lane, Front(manoeuvre, WAITING, True))
                     yield Event("slow", lane, manoeuvre), after
         for k, movement in enumerate(self.matrix.movements):
             if state.inside >> k & 1:
-                yield Event("leave", *movement), state._replace(inside=state.inside ^ 1 << k)
+                yield Event("leave", *movement), self._left(state, k)
+                yield from self.passes(state, k)
+
+    def passes(self, state: State, k: int) -> Iterator[Step]:
+        """All inside on a movement leave the way of one that is at the front of its lane.
+
+        They may have done so before, but it only matters now; they leave ways in any order.
+        """
+        if self.gate != "passed":
+            return
+        rows, m, ahead = self._movements.rows, len(self._foes), self.in_way(state, k)
+        for lane, front in enumerate(state.fronts):
+            if front is not None and ahead >> (foe := rows[lane][front.manoeuvre]) & 1:
+                passed = state.passed | 1 << k * m + foe
+                yield Event("pass", *self._movements[k], foe), state._replace(passed=passed)
+
+    def in_way(self, state: State, k: int) -> int:
+        """The movements, as bits, in whose way those inside on a movement still are."""
+        return self._foes[k] & ~(state.passed >> k * len(self._foes))
+
+    def _left(self, state: State, k: int) -> State:
+        """The last vehicle on a movement has left: what it passed, and what passed it, is over."""
+        m, (lane, manoeuvre) = len(self._foes), self._movements[k]
+        over = (1 << m) - 1 << k * m
+        front = state.fronts[lane]
+        if front is None or front.manoeuvre != manoeuvre:
+            over |= sum(1 << foe * m + k for foe in range(m))
+        return state._replace(inside=state.inside ^ 1 << k, passed=state.passed & ~over)
 
     def look(self, state: State) -> State:
         """All vehicles decide (Algorithm 1, lines 4 to 12).
 
         A committed vehicle goes. While vehicles cross, the gate "clear" leaves the rest as they
-        are, and "harmonious" keeps out those in conflict. Of the others, the best clique goes.
+        are, and the others keep out those in conflict (under "passed", those in whose way one is).
+        Of the rest, the best clique goes.
         """
         base, rows, bits = self.matrix.choices + 1, self._movements.rows, self._movements.bits
         there = [(lane, front) for lane, front in enumerate(state.fronts) if front is not None]
-        occupied = state.inside
-        for lane, front in there:
-            if front.phase == COMMITTED:
-                occupied |= bits[lane][front.manoeuvre]
-        frozen = bool(occupied) and self.gate == "clear"
+        committed = [rows[lane][it.manoeuvre] for lane, it in there if it.phase == COMMITTED]
+        frozen = bool(state.inside or committed) and self.gate == "clear"
+        barred = 0
+        for k in range(len(self._foes)):
+            barred |= self.in_way(state, k) if state.inside >> k & 1 else 0
+        for k in committed:
+            barred |= self._foes[k]
         case = 0
         for lane, front in there:
-            foes = self._foes[rows[lane][front.manoeuvre]]
-            if front.phase != COMMITTED and not foes & occupied:
+            if front.phase != COMMITTED and not barred & bits[lane][front.manoeuvre]:
                 case += front.manoeuvre * base**lane
         table = _table(self.matrix, self.order, self.priorities, state.turn, state.came)
         chosen = 0 if frozen else table.lanes(case)
@@ -169,17 +201,23 @@ class Protocol:
         return state._replace(fronts=tuple(fronts), decided=decided)
 
     def conflict(self, state: State) -> tuple[Movement, Movement] | None:
-        """Two conflicting movements of different arms that are inside at once, or None if safe."""
+        """Two conflicting movements inside at once, neither past the other, or None if safe."""
         movements = self.matrix.movements
         for k in reversed(range(len(movements))):
-            foes = self._foes[k] & state.inside
-            if state.inside >> k & 1 and foes:
-                return movements[foes.bit_length() - 1], movements[k]
+            if not state.inside >> k & 1:
+                continue
+            for foe in reversed(range(k)):
+                ahead = state.inside & self.in_way(state, k)
+                if ahead >> foe & self.in_way(state, foe) >> k & 1:
+                    return movements[foe], movements[k]
         return None
 
-    def _enter(self, state: State, lane: int, manoeuvre: int) -> State:
+    def entered(self, state: State, lane: int, manoeuvre: int) -> State:
+        """The state after the front vehicle of a lane has entered."""
         after = self._put(state, lane, None)
+        m, k = len(self._foes), self._movements.rows[lane][manoeuvre]
         return after._replace(
+            passed=state.passed & ~((1 << m) - 1 << k * m),
             inside=state.inside | self._movements.bits[lane][manoeuvre],
             came=tuple(other for other in state.came if other != lane),
         )

@@ -92,5 +92,5 @@ class Tally:
             percept = self._reader.read(sight)
             frozen = bool(percept.crossing) and rules.gate == "clear"
             if vehicle in percept.participants and not frozen:
-                choices.add(table.surely(percept.case, percept.unknown, percept.occupied))
+                choices.add(table.surely(*percept.asked))
         return choices

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 
 from figures.junction import drawing
+from figures.whole import HeadSpan, head_spans
 from minisim.control import HALTING
 from minisim.errors import InputError
 from minisim.junction.paths import Floats
@@ -21,6 +23,12 @@ Rows = npt.NDArray[np.int64]
 DRIVING, STANDING, RELEASED = 0, 1, 2
 #: A collision is marked for this long [s] by a ring of this radius [m].
 COLLISION_SHOWN, RING = 3.0, 5.0
+#: The middle of the roof is this share of a body's length behind its front, and the arrow on it
+#: has these corners [m].
+ROOF = 0.68
+ARROW = np.array([
+    (0.85, 0.0), (0.1, 0.75), (0.1, 0.25), (-0.8, 0.25), (-0.8, -0.25), (0.1, -0.25), (0.1, -0.75)
+])  # fmt: skip
 
 
 class Frames:
@@ -47,6 +55,10 @@ class Frames:
         released = frame["right_of_way"].to_numpy() & (self.s <= clear)
         self.still = frame["speed_mps"].to_numpy() <= HALTING
         self.state = np.where(released, RELEASED, np.where(self.still, STANDING, DRIVING))
+        self._bearing = np.array([site.intersection.arms[p.exit_arm].bearing for p in paths])
+        self._heads: dict[int, list[HeadSpan]] = {}
+        for span in head_spans(run):
+            self._heads.setdefault(span.lane, []).append(span)
         human = np.array(run.kinds or [""] * len(run.columns.lane)) == "human"
         self.human = human[frame["vehicle"].to_numpy()]
         harmed = np.full(len(human), np.inf)
@@ -63,7 +75,7 @@ class Frames:
         gone = frame[(self.s > clear) & np.isinf(self.harmed)].groupby("vehicle")["time_s"].min()
         cleared = np.sort(gone.to_numpy())
         # A vehicle that was clear before the first frame does not count as served.
-        self.cleared = cleared[cleared > frame["time_s"].iloc[0]]
+        self.cleared = cleared[cleared > max(start, frame["time_s"].iloc[0])]
 
     def at(self, time: float) -> slice:
         """The rows of one step."""
@@ -93,6 +105,28 @@ class Frames:
         nearest_last = before[np.argsort(self.s[before], kind="stable")].tolist()
         first = {int(self.lane[row]): row for row in nearest_last}
         return {lane for lane, row in first.items() if self.state[row] == RELEASED}
+
+    @property
+    def signalled(self) -> bool:
+        """Whether the junction has signal heads."""
+        return bool(self._heads)
+
+    def heads(self, time: float) -> dict[int, str]:
+        """What the head of each lane shows; empty without signals."""
+        now = time + self.run.site.dt / 2.0
+        return {
+            lane: spans[max(bisect_right(spans, now, key=lambda it: it.start) - 1, 0)].state
+            for lane, spans in self._heads.items()
+        }
+
+    def arrows(self, rows: Rows) -> list[Floats]:
+        """On the roof of each vehicle up to the exit: an arrow to the arm by which it leaves."""
+        rows = rows[self.s[rows] <= self.exit[self.path[rows]]]
+        lengths = np.array([it.length for it in self.run.site.types])[self.type[rows]]
+        heading = np.radians(self.angle[rows])
+        x = self.x[rows] - ROOF * lengths * np.sin(heading)
+        y = self.y[rows] - ROOF * lengths * np.cos(heading)
+        return list(drawing.place(ARROW, x, y, self._bearing[self.path[rows]]))
 
     def ways(self, rows: Rows) -> list[Floats]:
         """The rest of the path, up to the exit, of each vehicle with the right of way."""

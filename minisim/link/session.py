@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
-from minisim.channel import Air, Channel, chances, steps
+from minisim.channel import Air, Chances, Channel, steps
 from minisim.control import (
     Advise,
     Brake,
@@ -98,7 +98,7 @@ class Link:
         )  # fmt: skip
         self._interval = max(steps(radio.interval, site.dt), 1)
         self._vehicles, self._office = Vehicles(site), Office(site, plan)
-        random = chances(site.seed)
+        random = Chances(site.seed)
         self._up: Air[Status] = Air(site.channel, site.dt, random)
         self._down: Air[Order | Reserve | Confirmed] = Air(site.channel, site.dt, random)
         self._alarm = Alarm(plan.period, site.dt)
@@ -108,6 +108,8 @@ class Link:
 
     def __getattr__(self, name: str) -> Any:
         """Whatever else the session has, such as `kind`."""
+        if name.startswith("_"):  # a copy has no session yet when it is asked for its methods
+            raise AttributeError(name)
         return getattr(self._session, name)
 
     @property

@@ -8,12 +8,12 @@ import platform
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 import numpy as np
 
 from minisim.arrivals import Arrivals
-from minisim.control import Controller, Plan, Site
+from minisim.control import Command, Controller, Plan, Site
 from minisim.engine.collision import Collision
 from minisim.engine.state import Records
 from minisim.errors import InputError
@@ -33,6 +33,10 @@ if TYPE_CHECKING:
 
     from minisim.results.safety import Encounters
     from minisim.results.why import Account
+
+
+#: A step, and the commands given from outside then.
+Given: TypeAlias = tuple[int, tuple[Command, ...]]
 
 
 class ScenarioLike(Protocol):
@@ -102,6 +106,7 @@ class Run:
     kinds: tuple[str, ...] = ()  #: kind of each vehicle by id; empty if all are of one kind
     reasons: tuple[Told, ...] | None = None  #: why vehicles waited, by time; None unless `explain`
     heads: tuple[Shown, ...] | None = None  #: what signal heads showed, by time; None likewise
+    given: tuple[Given, ...] = ()  #: commands from outside, by step
     #: What moved the vehicles, for the provenance: the `host` and perhaps its version.
     host: Mapping[str, str] = field(default_factory=lambda: {"host": "minisim"})
     environment: Mapping[str, str] = field(default_factory=environment)

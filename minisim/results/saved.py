@@ -39,7 +39,7 @@ PACKAGES: Final = ("minisim", "dim", "baselines", "scenarios")
 #: The fields of a run that hold plain values.
 _VALUES: Final = (
     "seed", "site", "plan", "collisions", "record", "record_window", "counts", "exchange",
-    "host", "environment", "reasons", "heads",
+    "host", "environment", "reasons", "heads", "given",
 )  # fmt: skip
 
 

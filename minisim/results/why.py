@@ -9,7 +9,7 @@ import numpy as np
 
 from minisim.errors import InputError, integer, number
 from minisim.reasons import Reason, Told
-from minisim.ticks import first_tick
+from minisim.ticks import first_tick, time_of
 
 if TYPE_CHECKING:
     from minisim.results.run import Run
@@ -85,5 +85,8 @@ def account_of(run: Run) -> Account:
         run.scenario, run.controller, seed=run.seed, record="all", explain=True,
         on_collision="record",
     )  # fmt: skip
+    for tick, commands in run.given:
+        again.advance(time_of(tick, run.site.dt))
+        again.command(*commands)
     again.advance(run.columns.end)
     return Account(again.result())

@@ -43,8 +43,9 @@ def protocol(
     gate: Annotated[
         str,
         typer.Option(
-            metavar="clear|harmonious",
-            help="Which vehicles may enter while others cross: none, or those in harmony.",
+            metavar="clear|harmonious|passed",
+            help="Which vehicles may enter while others cross: none, those in harmony, or "
+            "also those in whose way none is any more.",
         ),
     ] = "clear",
     order: options.Order = "size",

@@ -46,6 +46,7 @@ def why(
     start: options.Start = None,
 ) -> None:
     """Say why a vehicle waited or went at a time, in the run that `run` makes."""
+    from minisim.errors import number
     from scenarios.controllers import controller_named
     from scenarios.recipe import Recipe
 
@@ -54,6 +55,7 @@ def why(
         unit=unit, fleet=fleet, lane_width=lane_width, profile=profile, side=side, node=node,
         horizon=horizon, demand_time=demand_time,
     )  # fmt: skip
+    number("--at [s]", at, low=0, high=junction.horizon)
     recipe = Recipe(
         junction, controller_named(controller, profile), seed, humans, latency, jitter, loss,
         on_collision="record",

@@ -6,13 +6,17 @@ import ast
 import builtins
 import re
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from dim import Dim
 from minisim.counts import read_counts
+from minisim.simulation import simulate
 from tests import ROOT
+from tests.builders import digest
 
-DOCS = "benchmark", "counts", "messages", "pcu", "safety"
+DOCS = "benchmark", "counts", "messages", "pcu", "safety", "stepping"
 PAGES = ("README.md", *(f"docs/{name}.md" for name in DOCS))
 
 
@@ -61,3 +65,13 @@ def test_its_mapping_is_one(tmp_path: Path) -> None:
     assert count.arms == ("B", "C", "D", "A")
     assert count.left_out == {"outside from … until": 120}
     assert count.vehicles.sum() == 2 * 12 * 10
+
+
+def test_a_search_looks_ahead(capsys: pytest.CaptureFixture[str]) -> None:
+    """The examples in docs/stepping.md: DIM from outside, and a tree search."""
+    outside, search = blocks("docs/stepping.md")
+    made: dict[str, Any] = {}
+    exec(compile(outside, "docs/stepping.md", "exec"), made)
+    assert digest(made["run"]) == digest(simulate(made["scenario"], Dim(), 1))
+    exec(compile(search, "docs/stepping.md", "exec"), {})
+    assert int(capsys.readouterr().out) > 0

@@ -130,7 +130,7 @@ class Oracle:
             case "turn" | "reaction":
                 assert waits
                 assert me.speed_mps <= 0.5
-            case "gap too short" | "held" | "comes" | "looks again" | "intent unknown":
+            case "others first" | "held" | "comes" | "looks again" | "intent unknown":
                 assert waits
             case "monitor":
                 assert len(others)

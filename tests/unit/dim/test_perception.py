@@ -24,7 +24,7 @@ def test_a_vehicle_of_unknown_intent_may_take_any_manoeuvre() -> None:
     crossing = car(1, "b2", -3.0)._replace(manoeuvre=UNKNOWN)
     taking_part = car(2, "c1", 4.0)._replace(manoeuvre=UNKNOWN)
     percept = STOPPABLE.read(view(crossing, taking_part, car(3, "d3", 5.0)))
-    assert percept == ((2, 3), (1,), 3 * 4**3, occupied("b1", "b2", "b3"), 1 << 2)
+    assert percept == ((2, 3), (1,), 3 * 4**3, occupied("b1", "b2", "b3"), 1 << 2, 0)
 
 
 def test_with_types_told_apart_a_vehicle_counts_as_one_of_its_type() -> None:
@@ -33,7 +33,7 @@ def test_with_types_told_apart_a_vehicle_counts_as_one_of_its_type() -> None:
     crossing = car(3, "b2", -3.0)._replace(type=1)
     percept = reader.read(view(bus, crossing, lost._replace(manoeuvre=UNKNOWN), car(4, "d3", 5.0)))
     assert percept == (
-        (1, 2, 4), (3,), (3 + 2) + 3 * 7**3, occupied("b2") << m, 2 * 3**2,
+        (1, 2, 4), (3,), (3 + 2) + 3 * 7**3, occupied("b2") << m, 2 * 3**2, 0,
     )  # fmt: skip
     assert reader.typed(bus) == (0, 5)
     assert STOPPABLE.typed(bus) == (0, 2)
@@ -71,22 +71,22 @@ def test_a_mark_passed_within_rounding_counts() -> None:
 def test_a_committed_vehicle_blocks_its_lane(reader: Reader, distance: float, speed: float) -> None:
     others = car(2, "a3", 7.0), car(3, "b1", 5.0)
     percept = reader.read(view(car(1, "a1", distance, speed), *others))
-    assert percept == ((3,), (1,), TABLE.case(["b1"]), occupied("a1"), 0)
+    assert percept == ((3,), (1,), TABLE.case(["b1"]), occupied("a1"), 0, 0)
     percept = reader.read(view(car(1, "a1", -0.01, speed), *others))
-    assert percept == ((2, 3), (1,), TABLE.case(["a3", "b1"]), occupied("a1"), 0)
+    assert percept == ((2, 3), (1,), TABLE.case(["a3", "b1"]), occupied("a1"), 0, 0)
 
 
 def test_all_committed_vehicles_of_a_lane_are_crossing() -> None:
     """6.25 m to stop at 5 m/s: neither of the two can."""
     percept = STOPPABLE.read(view(car(1, "a1", 0.5, 5.0), car(2, "a2", 5.5, 5.0)))
-    assert percept == ((), (1, 2), 0, occupied("a1", "a2"), 0)
+    assert percept == ((), (1, 2), 0, occupied("a1", "a2"), 0, 0)
 
 
 def test_behind_vehicles_in_the_junction_the_next_one_is_the_front_vehicle() -> None:
     percept = STOPPABLE.read(
         view(car(1, "a1", -12.0, 5.0), car(2, "a1", -3.0, 5.0), car(3, "a3", 4.0), car(4, "a1", 8))
     )
-    assert percept == ((3,), (1, 2), TABLE.case(["a3"]), occupied("a1"), 0)
+    assert percept == ((3,), (1, 2), TABLE.case(["a3"]), occupied("a1"), 0, 0)
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ import io
 import json
 import math
 import re
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import combinations, product
 from pathlib import Path
@@ -21,12 +22,14 @@ from hypothesis import strategies as st
 from PIL import Image
 
 import minisim
+from baselines import FixedTime
 from dim import Dim, HarmonyMatrix, explain
-from figures import decision_figure, performance_figure, style, write_animation
+from figures import animation, decision, performance_figure, style, write_animation
 from figures.film.animate import Picture, frame_times
 from figures.film.encode import COLOURS, palette_of, write_gif, write_html
 from figures.film.frames import RELEASED, Frames
 from figures.junction import drawing
+from figures.whole import filmed, head_spans
 from minisim.control import Plan, Unregulated
 from minisim.errors import InputError
 from minisim.fleet import TYPES
@@ -34,10 +37,11 @@ from minisim.junction.conflicts import corridor
 from minisim.junction.geometry import Intersection
 from minisim.results.run import Run
 from minisim.vehicle import VehicleType
-from scenarios import four_way
+from scenarios import Scenario, five_way, four_way
 from scenarios.controllers import VARIANTS
 from scenarios.profiles import FAIR
 from tests.builders import Fixed, replayed
+from tests.colours import EYES, apart, rgb
 
 INTERSECTIONS = [
     Intersection((0, 120, 240)),
@@ -139,6 +143,43 @@ def test_lanes_open_with_their_first_vehicle(film: Frames) -> None:
     assert opened
 
 
+def test_a_film_shows_what_the_heads_show_at_all_times(tmp_path: Path) -> None:
+    """Also where no vehicle comes, and amber: the run was not asked for its heads."""
+    run = minisim.simulate(four_way(100, horizon=120), FixedTime(), seed=2, record="all")
+    film, spans, seen = Frames(run, 0.0), head_spans(run), set()
+    picture = Picture(run)
+    for time in frame_times(0.0, 119.0, 2.0, 0.1).tolist():
+        shown = film.heads(time)
+        for span in spans:
+            if span.start <= time < span.end:
+                assert shown[span.lane] == span.state
+        seen |= set(shown.values())
+        if time % 10 < 0.1:
+            picture.draw(time)
+            drawn = {state: len(marks.get_xdata()) for state, marks in picture._heads.items()}
+            assert drawn == {state: [*shown.values()].count(state) for state in style.HEADS}
+    assert seen == set(style.HEADS)
+    words = {text.get_text() for text in picture._figure.texts}
+    assert words >= {"green", "amber", "red", "band: its way"}
+
+
+@pytest.mark.parametrize("make", [four_way, five_way])
+def test_arrows_on_roofs_point_where_vehicles_leave(make: Callable[..., Scenario]) -> None:
+    run = minisim.simulate(make(300, horizon=60), Dim(), seed=1, record="all")
+    film, arms = Frames(run, 0.0), run.site.intersection.arms
+    rows = film.rows(film.at(film.busiest), 1e9)
+    rows = rows[film.s[rows] <= film.exit[film.path[rows]]]
+    arrows, manoeuvres = film.arrows(rows), set()
+    for arrow, path in zip(arrows, film.path[rows].tolist(), strict=True):
+        way = run.site.intersection.paths[path]
+        forward = arrow[0] - arrow[3:5].mean(axis=0)
+        np.testing.assert_allclose(
+            forward / np.linalg.norm(forward), arms[way.exit_arm].outward, atol=1e-9
+        )
+        manoeuvres.add(way.movement.manoeuvre)
+    assert manoeuvres == set(range(1, len(arms)))
+
+
 def test_ways_end_at_the_exit(run: Run, film: Frames) -> None:
     exits = np.array([path.position(path.exit) for path in run.site.intersection.paths])
     ways = [way for t in range(101, 130) for way in film.ways(film.rows(film.at(t), 1e9))]
@@ -195,10 +236,6 @@ def pixels(image: Image.Image) -> npt.NDArray[np.int64]:
     return np.asarray(image).astype(np.int64)
 
 
-def rgb(colour: str) -> list[int]:
-    return [int(colour[k : k + 2], 16) for k in (1, 3, 5)]
-
-
 def test_picture_is_the_same_whatever_was_drawn_before(run: Run, picture: Picture) -> None:
     before = pixels(picture.draw(105.0))
     picture.draw(128.3)
@@ -217,8 +254,8 @@ def test_picture_shows_the_vehicles(run: Run, picture: Picture) -> None:
             if not row.right_of_way and row.speed_mps > 0.1:
                 continue
             heading = np.radians(row.angle_deg)
-            rear = (row.x_m - 3.2 * np.sin(heading), row.y_m - 3.2 * np.cos(heading))
-            x, y = picture._axes.transData.transform(rear)
+            hood = (row.x_m - 0.8 * np.sin(heading), row.y_m - 0.8 * np.cos(heading))
+            x, y = picture._axes.transData.transform(hood)
             colour = image[image.shape[0] - 1 - round(y), round(x)]
             wanted = style.RIGHT_OF_WAY if row.right_of_way else style.WAITING
             assert np.abs(colour - rgb(wanted)).max() < 12
@@ -237,29 +274,6 @@ def test_every_zone_is_coloured(picture: Picture) -> None:
     assert {tuple(rgb(colour)) for colour in style.ZONES.values()} <= seen
 
 
-#: What dichromats see, for linear RGB: Machado et al., IEEE TVCG 15 (2009), table of severity 1.
-EYES = {
-    "usual": np.eye(3),
-    "protanope": [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216],
-                  [-0.003882, -0.048116, 1.051998]],
-    "deuteranope": [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413],
-                    [-0.011820, 0.042940, 0.968881]],
-}  # fmt: skip
-
-
-def lab(colour: str, eyes: str) -> npt.NDArray[np.float64]:
-    """A colour in CIELAB (D65) as these eyes see it."""
-    values = np.array(rgb(colour)) / 255.0
-    linear = np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
-    to_xyz = np.array(
-        [[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750],
-         [0.0193339, 0.1191920, 0.9503041]]
-    )  # fmt: skip
-    xyz = to_xyz @ np.clip(EYES[eyes] @ linear, 0.0, 1.0) / [0.95047, 1.0, 1.08883]
-    f = np.where(xyz > 216 / 24389, np.cbrt(xyz), (24389 / 27 * xyz + 16) / 116)
-    return np.array([116 * f[1] - 16, 500 * (f[0] - f[1]), 200 * (f[1] - f[2])])
-
-
 @pytest.mark.parametrize("eyes", EYES)
 def test_zones_are_told_apart_without_red_and_green(eyes: str) -> None:
     zones = list(style.ZONES.values())
@@ -267,7 +281,7 @@ def test_zones_are_told_apart_without_red_and_green(eyes: str) -> None:
     beside = [*product(zones, (style.ASPHALT, style.BLUE))]
     for least, close in ((20.0, pairs), (15.0, beside)):
         for one, other in close:
-            assert np.linalg.norm(lab(one, eyes) - lab(other, eyes)) >= least
+            assert apart(one, other, eyes) >= least
 
 
 def test_the_legend_names_zones_by_their_place_and_fits(picture: Picture) -> None:
@@ -347,11 +361,30 @@ def test_a_gif_of_more_than_50_frames_per_second_keeps_its_length(tmp_path: Path
         assert film.info["duration"] == 20
 
 
-@pytest.mark.parametrize(("start", "seconds"), [(200.0, 2.0), (90.0, 20.0), (120.0, 20.0)])
-def test_no_recording_no_film(run: Run, tmp_path: Path, start: float, seconds: float) -> None:
-    with pytest.raises(InputError, match="the run was recorded from 100 to 130 s"):
+@pytest.mark.parametrize(("start", "seconds"), [(200.0, 2.0), (90.0, 60.0), (120.0, 20.0)])
+def test_no_film_after_the_end(run: Run, tmp_path: Path, start: float, seconds: float) -> None:
+    with pytest.raises(InputError, match="but the run ended at 130 s"):
         write_animation(run, tmp_path / "film.gif", start=start, seconds=seconds)
     assert not list(tmp_path.iterdir())
+
+
+def test_what_was_not_recorded_is_run_again(run: Run) -> None:
+    again = filmed(run, 90.0, 95.0)
+    assert again is not run
+    assert filmed(run, 100.0, 130.0) is run
+    np.testing.assert_array_equal(again.columns.arrival, run.columns.arrival)
+    pictures = [Picture(it, 100.0).draw(110.0) for it in (run, again)]
+    assert (pixels(pictures[0]) == pixels(pictures[1])).all()
+
+
+def test_an_animation_saves_and_shows_itself(run: Run, tmp_path: Path) -> None:
+    film = animation(run, start=110.0, seconds=0.3)
+    assert film._repr_html_().count("data:image/png") == 3
+    film.save(tmp_path / "film.gif", writer="pillow")
+    with Image.open(tmp_path / "film.gif") as saved:
+        assert saved.n_frames == 3
+        drawn, wanted = pixels(saved.convert("RGB")), pixels(Picture(run, 110.0).draw(110.0))
+    assert np.abs(drawn - wanted).mean() < 3.0, "the same picture, but for GIF's colours"
 
 
 def test_the_header_tells_recorded_arrivals_from_a_demand(run: Run) -> None:
@@ -421,7 +454,7 @@ def test_decision_figure_names_every_vehicle_and_its_texts_do_not_overlap(
     site = four_way().site()
     matrix = HarmonyMatrix.from_geometry(site.intersection, site.vehicle)
     explanation = explain(["a1", "b2", "c2", "d2"], matrix)
-    figure = decision_figure(explanation, site, Dim().start(site).plan, body)
+    figure = decision(explanation, site, Dim().start(site).plan, body)
     scene, graph = figure.axes
     assert {t.get_text() for t in scene.texts} >= {"a1", "b2", "c2", "d2", "a", "b", "c", "d"}
     assert {t.get_text() for t in graph.texts} >= {"a1", "b2", "c2", "d2"}

@@ -7,14 +7,14 @@ import math
 
 import pytest
 
-from minisim.channel import Air, Channel, chances, steps
+from minisim.channel import Air, Chances, Channel, steps
 from minisim.errors import InputError
 from minisim.ticks import NEVER
 
 
 def arrivals(channel: Channel, count: int, seed: int = 1, dt: float = 0.1) -> dict[int, int]:
     """Message -> when it arrives, if all are sent in step 0 [steps]."""
-    air: Air[int] = Air(channel, dt, chances(seed))
+    air: Air[int] = Air(channel, dt, Chances(seed))
     for message in range(count):
         air.send(0, message)
     come = {}
@@ -55,7 +55,7 @@ def test_the_share_that_is_lost(loss: float) -> None:
 def test_equal_seeds_lose_the_same_messages() -> None:
     channel = Channel(jitter=0.3, loss=0.4)
     assert arrivals(channel, 100) == arrivals(channel, 100) != arrivals(channel, 100, seed=2)
-    assert len({*itertools.islice(chances(1), 3000)}) == 3000
+    assert len({*itertools.islice(Chances(1), 3000)}) == 3000
 
 
 def test_a_name_says_what_fails() -> None:

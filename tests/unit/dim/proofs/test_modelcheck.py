@@ -29,7 +29,7 @@ class Few(Protocol):
 
     def arrivals(self, state: State):  # type: ignore[no-untyped-def]
         for event, after in super().arrivals(state):
-            if event[1:] == (0, 2) or (event[1:] == (1, 2) and state.fronts[0]):
+            if event[1:3] == (0, 2) or (event[1:3] == (1, 2) and state.fronts[0]):
                 yield event, after
 
 
@@ -37,7 +37,7 @@ class OneOf(Protocol):
     """Only a2 ever comes, and once it has entered it never leaves."""
 
     def arrivals(self, state: State):  # type: ignore[no-untyped-def]
-        yield from (step for step in super().arrivals(state) if step[0][1:] == (0, 2))
+        yield from (step for step in super().arrivals(state) if step[0][1:3] == (0, 2))
 
     def moves(self, state: State):  # type: ignore[no-untyped-def]
         yield from (s for s in super().moves(state) if s[0].what not in ("leave", "slow"))

@@ -38,6 +38,27 @@ def test_worked_examples_of_a_stop_controlled_junction() -> None:
     assert "".join(map(level_of_service, delays)) == "AAEDEDDD"
 
 
+def test_worked_example_of_a_signalised_junction() -> None:
+    """Example problem 1 of the Highway Capacity Manual, 7th ed. (2022), chapter 31, exhibit 31-81.
+
+    Transcribed by github.com/crosstraffic/transportations-library (tests/chapter19_integration.rs):
+    lane groups (left, through, right) from the west, east, south and north, the approaches, all.
+    """
+    groups = (45.5, 29.9, 30.6, 43.5, 35.5, 36.2, 13.5, 72.0, 76.7, 32.6, 17.0, 17.1)
+    levels = "".join(level_of_service(delay, "signalised") for delay in groups)
+    # The manual gives the two E an F, since their demand is over capacity (1.05 and 1.07).
+    assert levels == "DCCDDDBEECBB"
+    delays = (32.4, 37.0, 70.0, 19.6, 45.9)
+    assert "".join(level_of_service(delay, "signalised") for delay in delays) == "CDEBD"
+
+
+def test_worked_examples_of_all_way_stops() -> None:
+    """Example problems 1 and 2 for all-way stops of the same manual, chapter 32, as transcribed
+    there (tests/chapter21_integration.rs): lanes, approaches, then the whole junction."""
+    assert "".join(map(level_of_service, (13.0, 13.5, 12.8))) == "BBB"
+    assert "".join(map(level_of_service, (12.1, 16.1, 15.3, 14.0))) == "BCCB"
+
+
 @pytest.mark.parametrize("name", safe())
 def test_signals_are_graded_as_signals_and_all_others_as_unsignalised(name: str) -> None:
     run = simulate(four_way(250, profile="fair", horizon=60.0), controller_named(name))

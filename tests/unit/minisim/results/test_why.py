@@ -10,7 +10,8 @@ import pytest
 
 from baselines import FixedTime
 from dim import Dim
-from minisim import Run, simulate
+from minisim import Run, Simulation, simulate
+from minisim.control import Hold
 from minisim.errors import InputError
 from scenarios import four_way
 from scenarios.cli import main
@@ -98,3 +99,17 @@ def test_the_command_answers_for_the_run_that_run_makes(capsys: pytest.CaptureFi
     assert json.loads(capsys.readouterr().out)["reasons"][0]["sentence"] == said[0]
     assert main(["why", *given, "--vehicle", "9999", "--at", "150"]) == 2
     assert "vehicle must be an integer 0 …" in capsys.readouterr().err
+    for at in ("-1", "201"):
+        assert main(["why", *given, "--vehicle", "26", f"--at={at}"]) == 2
+        assert "--at [s] must be at least 0 and at most 200" in capsys.readouterr().err
+
+
+def test_commands_from_outside_are_given_again() -> None:
+    simulation = Simulation(SCENARIO, Dim(), seed=1)
+    simulation.advance(100.0)
+    inside = {vehicle.id for vehicle in simulation.view().vehicles}
+    simulation.command(*map(Hold, inside))
+    run = simulation.run()
+    assert run.given
+    again = run.explained.run
+    assert again.columns.arrival.tobytes() == run.columns.arrival.tobytes()
