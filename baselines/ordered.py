@@ -19,6 +19,7 @@ from baselines.optimum.alone import Drive
 from baselines.prediction import Floats
 from baselines.reservation import Manager, Reservation, ReservationSession, Slot
 from minisim.control import Advise, Command, Observed, Plan, Site, View
+from minisim.reasons import Reason
 
 #: Slowest advice [m/s], and how fast a vehicle accelerates on its way to the junction, as a share
 #: of what it can: the law accelerates less the nearer it is to the limit.
@@ -54,11 +55,13 @@ class OrderedSession(ReservationSession):
         super().__init__(Reservation(period=period), site)
         self.manager, self.plan = manager, Plan(marks=(reach,), sight=reach)
         self._advice: list[Command] = []
+        self._due: dict[int, tuple[int, float]] = {}  # kinds and times at the mark [s], in order
         self._alone: dict[int, float] = {}  # when each passes its mark if it drives on alone [s]
         self._between, self._past, ways = times
         self._marks = [way.place(t) for way, t in zip(ways, self._past, strict=True)]
         self._finals = [float(way.speed(0.0)) for way in ways]  # at the entry [m/s]
         movements, types = site.intersection.movements, len(site.types)
+        self._crosses = np.tile(site.conflicts, (types, types))
         self._conflict = np.tile(site.conflicts | ~movements.apart, (types, types))
         self._limit, self._types = site.limit, site.types
 
@@ -68,7 +71,7 @@ class OrderedSession(ReservationSession):
 
     def decide(self, view: View) -> Iterable[Command]:
         """Check the passages, grant new ones in order, and advise the others."""
-        self._advice, self._alone = [], {}
+        self._advice, self._alone, self._due = [], {}, {}
         return [*super().decide(view), *self._advice]
 
     def _grant(self, seen: dict[int, Observed], ahead: dict[int, int], now: int) -> Iterator[int]:  # noqa: ARG002
@@ -94,9 +97,18 @@ class OrderedSession(ReservationSession):
                 else:
                     speed = self._speed(me, kind, time - now * self._dt)
                     self._advice.append(Advise(me.id, speed))
+            if me is not None:
+                self._due[me.id] = kind, time
             if held:
                 blocked |= self._conflict[kind]
             free = np.maximum(free, time + self._between[kind])
+
+    def _waits(self, me: Observed, leader: int | None) -> Reason:  # noqa: ARG002  (the session's)
+        """When a vehicle is to pass, and after which vehicles in view."""
+        own, until = self._due[me.id]
+        before = list(self._due)[: list(self._due).index(me.id)]
+        others = tuple(v for v in before if self._crosses[own, self._due[v][0]])
+        return Reason("after" if others else "planned", me.id, others, until=until)
 
     def _when(self, me: Observed, kind: int, now: int) -> float:
         """When a vehicle passes its mark if it drives on alone [s]."""

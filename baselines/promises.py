@@ -94,6 +94,9 @@ class PromiseSession(ReservationSession):
                 return None
         return slot
 
+    def _possible(self, me: Observed, leader: int | None) -> Slot | None:
+        return self._passage(me, leader, self._now + self._wait)
+
     def _meets(self, me: Observed, slot: Slot) -> bool:
         """Whether a vehicle leaves by the same lane as a holder, or comes from the same one."""
         exits = self._exits

@@ -54,6 +54,7 @@ from minisim.junction.partings import branch
 from minisim.laws import Traits, traits_of
 from minisim.names import Name
 from minisim.parameters import declared, real
+from minisim.reasons import Reason
 
 #: Smaller differences from the prediction do not count [m], [m/s].
 POSITION_TOLERANCE, SPEED_TOLERANCE = 0.05, 0.05
@@ -193,8 +194,10 @@ class Manager:
 
     def fits(self, slot: Slot, *, last: bool) -> bool:
         """Whether a passage fits every other; the `last` comes after all in its exit lane."""
-        if slot.hard:
-            return False
+        return not slot.hard and next(self.misfits(slot, last=last), None) is None
+
+    def misfits(self, slot: Slot, *, last: bool) -> Iterator[Slot]:
+        """Those passages that a passage does not fit; see `fits`."""
         exit_arm = self._ways[slot.movement].exit_arm
         for other in self.slots.values():
             if other.vehicle == slot.vehicle or other.movement not in slot.zones:
@@ -202,8 +205,7 @@ class Manager:
             merges = self._ways[other.movement].exit_arm == exit_arm
             before = not (last and merges) and self._clears(slot, other, merges)
             if not before and not self._clears(other, slot, merges):
-                return False
-        return True
+                yield other
 
     def _clears(self, first: Slot, second: Slot, merges: bool) -> bool:
         """Whether `first` has passed when `second` comes, and enters a common exit lane first."""
@@ -226,10 +228,12 @@ class ReservationSession:
         self._dt = site.dt
         self._brakes = [it.deceleration for it in site.types]
         self._requests: dict[int, None] = {}  # in the order of first requests
+        self._now = -1  # when it last decided [steps]
+        self._said: dict[int, Reason] = {}  # as of then, if it was asked
 
     def decide(self, view: View) -> Iterable[Command]:
         """Check the reservations, then consider the requests in the order in which they came."""
-        now = round(view.time / self._dt)
+        self._now = now = round(view.time / self._dt)
         manager = self.manager
         seen = {vehicle.id: vehicle for vehicle in view.vehicles}
         manager.slots = {v: slot for v, slot in manager.slots.items() if slot.ends >= now}
@@ -243,6 +247,37 @@ class ReservationSession:
         if seen:
             commands.append(Wake(view.time + self._period))
         return commands
+
+    def reasons(self, view: View) -> dict[int, Reason]:
+        """Why vehicles before the junction wait or go (`minisim.reasons.Explaining`)."""
+        if round(view.time / self._dt) == self._now:  # later, the passages may have ended
+            self._said = dict(self._explain(view))
+        before = (v.id for v in view.vehicles if v.distance >= 0.0)
+        return {vehicle: self._said[vehicle] for vehicle in before if vehicle in self._said}
+
+    def _explain(self, view: View) -> Iterator[tuple[int, Reason]]:
+        """The reasons of holders and of those that have none without a passage ahead of them."""
+        slots, leader = self.manager.slots, None
+        for me in view.vehicles:
+            if leader is not None and leader.lane != me.lane:
+                leader = None
+            if me.id in slots:
+                yield me.id, Reason("passage", me.id, until=slots[me.id].enters * self._dt)
+            elif leader is None or leader.id in slots:
+                yield me.id, self._waits(me, leader and leader.id)
+            leader = me if me.distance >= 0.0 else None
+
+    def _waits(self, me: Observed, leader: int | None) -> Reason:
+        """Why a vehicle has no passage."""
+        slot = self._possible(me, leader)
+        if slot is None or slot.hard:
+            return Reason("no passage", me.id)
+        others = tuple(it.vehicle for it in self.manager.misfits(slot, last=True))
+        return Reason("no passage" if others else "looks again", me.id, others)
+
+    def _possible(self, me: Observed, leader: int | None) -> Slot | None:
+        """The passage that a vehicle asks for now."""
+        return self._predict(me, self._now, leader)
 
     def _permit(self, vehicle: int) -> Command:
         """The command that gives a new holder the right of way."""

@@ -25,6 +25,7 @@ from collections.abc import Iterable
 from minisim.control import Advise, Command, Go, Observed, Plan, Radio, Site, View, Wake
 from minisim.names import Name
 from minisim.parameters import declared, real
+from minisim.reasons import Reason
 
 #: Added to speeds used as divisors, as in the authors' code [m/s].
 CRAWL = 1e-5
@@ -103,6 +104,21 @@ class V2ICSession:
         yield from self._serve(seen)
         if len(self.granted) < len(self.order):
             yield Wake(view.time + self._period)
+
+    def reasons(self, view: View) -> dict[int, Reason]:
+        """Why vehicles wait that have none ahead of them waiting (`minisim.reasons.Explaining`)."""
+        seen = {vehicle.id: vehicle for vehicle in view.vehicles}
+        rows = {v.id: self._rows[v.lane][v.manoeuvre] for v in view.vehicles}
+        waiting = [v for v in reversed(view.vehicles) if v.id not in self.granted]
+        fronts = {v.lane: v.id for v in waiting}
+        order = [vehicle for vehicle in self.order if vehicle in seen]
+        found = {}
+        for me in fronts.values():
+            if me in order:
+                before = order[: order.index(me)]
+                others = tuple(v for v in before if rows[v] in self._foes[rows[me]])
+                found[me] = Reason("listed" if others else "looks again", me, others)
+        return found
 
     def _register(self, seen: dict[int, Observed]) -> None:
         """Drop vehicles that have left, and append new ones, nearest first."""

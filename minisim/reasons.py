@@ -24,7 +24,7 @@ KINDS: Mapping[str, str] = {
     "behind": "Vehicle {me} is behind {others} in its lane.",
     "crossing": "Vehicle {me} is crossing the junction.",
     "goes": "Vehicle {me} has the right of way.",
-    "advised": "Vehicle {me} has the right of way, and is told to drive at {note} at most.",
+    "advised": "Vehicle {me} is told to drive at {note} at most.",
     "clique goes": "Vehicle {me} has the right of way with its clique, {clique}. {note}",
     "committed": "Vehicle {me} can no longer stop before the junction, so it goes on.",
     "held": "Vehicle {me} does not have the right of way.",
@@ -42,10 +42,24 @@ KINDS: Mapping[str, str] = {
         "could go in every case."
     ),
     "looks again": "Vehicle {me} decides again when it next looks.",
+    "passage": "Vehicle {me} has a passage through the junction, and enters it at {until}.",
+    "no passage": (
+        "Vehicle {me} has no passage yet: the one that it asks for does not fit that of {others}."
+    ),
+    "after": "Vehicle {me} is to pass at {until}, after {others} on a way that conflicts.",
+    "planned": "Vehicle {me} is to pass at {until}, as planned.",
+    "listed": "Vehicle {me} is in the serving list after {others} on a way that conflicts.",
+    "not heard": "Vehicle {me} has not been heard by the controller yet.",
+    "not told": "Vehicle {me} may go, but the message that says so has not reached it yet.",
+    "told for later": "Vehicle {me} has a passage, and the right of way from {until} on.",
+    "in doubt": "Vehicle {me} waits until it is known that {others} {no_longer} the right of way.",
     "monitor": "Vehicle {me} is braked by its safety monitor for {others}.",
     "red": "Vehicle {me} waits: its signal has been red{head}.",
     "amber": "Vehicle {me} stops: its signal has been amber{head}.",
-    "gap": "Vehicle {me} has a green signal, but must yield to the traffic that faces it.",
+    "gap": (
+        "Vehicle {me} has a green signal, but waits for a gap: {others} {cross} on a way that "
+        "conflicts."
+    ),
     "approaching": "Vehicle {me} must first stand at the line.",
     "reaction": "Vehicle {me} has stopped and looks; it cannot go before {until}.",
     "others first": (
@@ -86,7 +100,9 @@ class Reason:
             since="?" if self.since is None else f"{self.since:.1f} s",
             until="?" if self.until is None else f"{self.until:.1f} s",
             head=head, note=self.note, is_are="is" if one else "are",
-            hold="holds" if one else "hold", cross="crosses" if one else "cross",
+            hold="holds" if one else "hold",
+            no_longer="no longer holds" if one else "no longer hold",
+            cross="crosses" if one else "cross",
         ).strip()  # fmt: skip
 
     def as_dict(self) -> dict[str, Any]:

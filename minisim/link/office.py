@@ -19,6 +19,7 @@ from minisim.control import (
     View,
 )
 from minisim.link.messages import Order, Status
+from minisim.reasons import Reason
 from minisim.ticks import time_of
 
 
@@ -65,6 +66,19 @@ class Office:
         files = [file for lane in self._lanes for file in lane.values()]
         told = {it.vehicle.id: Report(time_of(it.sent, self._dt), it.holds) for it in files}
         return View(time_of(now, self._dt), tuple(it.vehicle for it in files), told)
+
+    def reason(self, vehicle: int) -> Reason | None:
+        """Why a vehicle waits, if that is due to messages."""
+        file = self._known.get(vehicle)
+        if file is None:
+            return Reason("not heard", vehicle)
+        if not file.wanted:
+            return None
+        if file.order.go:
+            return Reason("not told", vehicle)
+        foes = self._foes[file.movement]
+        others = tuple(v for v, movement in self._holders.items() if movement in foes)
+        return Reason("in doubt", vehicle, others)
 
     def hear(self, status: Status) -> bool:
         """Note a message; returns whether the session is to be woken."""

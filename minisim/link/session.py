@@ -34,6 +34,7 @@ from minisim.link.office import Office
 from minisim.link.vehicles import Vehicles
 from minisim.names import name_of
 from minisim.parameters import checked, declared, part
+from minisim.reasons import Explaining, Reason
 from minisim.ticks import NEVER, time_of
 
 
@@ -121,6 +122,24 @@ class Link:
             "orders_sent": self._down.sent,
             "messages_lost": self._up.lost + self._down.lost,
         }
+
+    def reasons(self, view: View) -> dict[int, Reason]:
+        """Why the first vehicles of the lanes wait, and which messages are missing."""
+        fronts = {v.lane: v.id for v in reversed(view.vehicles) if v.distance >= 0.0}
+        waiting = [v for v in fronts.values() if not self._vehicles.holds(v)]
+        known, said = self._office.view(round(view.time / self._dt)), {}
+        if isinstance(self._session, Explaining):
+            said = dict(self._session.reasons(known))
+        for vehicle in list(said):
+            if vehicle not in waiting:
+                del said[vehicle]
+            elif said[vehicle].kind == "passage":  # which the vehicle does not hold yet
+                said[vehicle] = Reason("not told", vehicle)
+        for vehicle in waiting:
+            reason = self._vehicles.reason(vehicle) or self._office.reason(vehicle)
+            if reason is not None:
+                said[vehicle] = reason
+        return said
 
     def decide(self, view: View) -> Iterable[Command]:
         """One step: vehicles speak, the controller listens, decides and speaks, vehicles obey."""

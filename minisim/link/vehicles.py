@@ -18,6 +18,7 @@ from minisim.control import (
     can_stop,
 )
 from minisim.link.messages import Confirmed, Order, Status
+from minisim.reasons import Reason
 from minisim.ticks import time_of
 
 
@@ -55,6 +56,17 @@ class Vehicles:
                 del self._units[vehicle]
         for vehicle in self._present.keys() - before.keys():
             self._units[vehicle] = Unit(Order(vehicle, 0))
+
+    def holds(self, vehicle: int) -> bool:
+        """Whether a vehicle in view has the right of way."""
+        return self._units[vehicle].holds
+
+    def reason(self, vehicle: int) -> Reason | None:
+        """Why it waits, if it knows from when on it may go."""
+        passage = self._units[vehicle].reserved
+        if passage is None:
+            return None
+        return Reason("told for later", vehicle, until=passage.time)
 
     def statuses(self, now: int) -> Iterator[Status]:
         """What they say now."""

@@ -10,12 +10,15 @@ import pytest
 
 from dim import Dim, HarmonyMatrix, Mixed, Monitor, NoisyPerception
 from minisim import simulate
+from minisim.channel import Channel
 from minisim.control import Controller, Observed, can_stop
 from minisim.junction.movements import ARM_NAMES, Movement
-from minisim.reasons import KINDS, Reason
+from minisim.link import Linked
+from minisim.reasons import KINDS, Explaining, Reason, Signalling
 from minisim.results.run import Run
 from minisim.sumo import simulate as simulate_in_sumo
 from scenarios import five_way, four_way, three_way
+from scenarios.controllers import CONTROLLERS as TABLE
 from scenarios.controllers import controller_named, safe
 from tests.builders import digest, seen
 
@@ -28,6 +31,8 @@ CONTROLLERS: tuple[Controller, ...] = (
 )
 #: A vehicle this slow waits, as in the metric of waiting time [m/s].
 WAITS = 0.1
+#: Kinds that are told of messages.
+MESSAGES = ("not heard", "not told", "told for later", "in doubt")
 
 
 class Oracle:
@@ -109,6 +114,17 @@ class Oracle:
                 assert reason.since is not None
                 assert reason.since <= time
                 assert reason.until is None or reason.until > time - 0.5
+            case "passage":
+                assert goes
+                assert reason.until is not None
+            case "no passage" | "after" | "listed":
+                assert waits
+                assert (others.inside | others.right_of_way | (others.distance >= 0.0)).all()
+                assert all(conflicts[me.way, it.way] for it in others.itertuples())
+                assert not (others.arm == me.arm).any()
+                assert (reason.until is not None) == (reason.kind == "after")
+            case "planned":
+                assert waits
             case "approaching":
                 assert waits
             case "turn" | "reaction":
@@ -160,6 +176,32 @@ def _check(run: Run, pairs: int, seed: int) -> None:
 def test_reasons_agree_with_the_trajectories(controller: Controller) -> None:
     run = simulate(four_way(350, horizon=300.0), controller, 3, record="all", explain=True)
     _check(run, 60, 1)
+
+
+FAILING = Channel(latency=0.2, jitter=0.1, loss=0.2)
+
+
+#: Of these, only what they command is known.
+SILENT = {"dim-as-run", "v2ic-as-run", "unregulated"}
+
+
+@pytest.mark.parametrize("name", [name for name in TABLE if name not in SILENT])
+def test_each_controller_says_why_or_shows_heads(name: str) -> None:
+    session = controller_named(name).start(four_way(100).site(0))
+    assert isinstance(session, Explaining | Signalling)
+
+
+@pytest.mark.parametrize("name", ["v2ic", "reservation", "slots"])
+def test_reasons_are_true_if_messages_fail(name: str) -> None:
+    linked = Linked(controller_named(name), FAILING)
+    run = simulate(four_way(350, horizon=200.0), linked, 3, record="all", explain=True)
+    oracle = Oracle(run)
+    told = [it for it in run.reasons or () if it.reason.kind in MESSAGES]
+    assert {it.reason.kind for it in told} >= {"not told", "not heard"}
+    for time, reason in told:
+        me = oracle.at(time).loc[reason.vehicle]
+        assert me.distance >= 0.0
+        assert not me.right_of_way
 
 
 @pytest.mark.slow

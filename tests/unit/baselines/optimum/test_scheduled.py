@@ -45,3 +45,13 @@ def test_schedules_have_short_names_of_their_own() -> None:
     one, other = kept((0, 1, 2)), kept((1, 0, 2))
     assert name_of(one) != name_of(other)
     assert len(name_of(one)) == len("scheduled#01234567")
+
+
+def test_a_vehicle_that_waits_says_when_it_is_to_pass_and_after_which() -> None:
+    controller = kept((1, 0, 2))
+    plain, run = (simulate(SCENARIO, controller, explain=asked) for asked in (False, True))
+    assert (plain.columns.arrival == run.columns.arrival).all()
+    waits = [it.reason for it in run.reasons or () if it.reason.kind == "after"]
+    assert {(it.vehicle, it.vehicles) for it in waits} == {(0, (1,)), (2, (1, 0))}
+    entered = {it.reason.vehicle: it.time for it in run.reasons or () if "cross" in it.reason.kind}
+    assert all(abs((it.until or 0.0) - entered[it.vehicle]) < 2.0 for it in waits)
