@@ -52,7 +52,8 @@ def runs(draw: st.DrawFn) -> tuple[Site, Dim, list[View]]:
     dim = Dim(
         order=draw(st.sampled_from(ORDERS)),
         commit=draw(st.sampled_from(COMMITS)),
-        gate=draw(st.sampled_from(GATES)),
+        # The model has no places of bodies: of "passed", see tests/unit/dim/test_passing.py.
+        gate=draw(st.sampled_from([gate for gate in GATES if gate != "passed"])),
         priorities=draw(st.none() | st.permutations(range(n)).map(tuple)),
     )
     return SITES[n], dim, draw(views(n))

@@ -245,7 +245,7 @@ class CarelessTraffic(Traffic):
 
 def test_the_machine_finds_what_the_papers_commit_rule_does() -> None:
     wanted = settings(
-        max_examples=60, stateful_step_count=15, phases=[Phase.generate],
+        max_examples=400, stateful_step_count=15, phases=[Phase.generate],
         report_multiple_bugs=False, print_blob=False,
     )  # fmt: skip
     with pytest.raises(CollisionError):

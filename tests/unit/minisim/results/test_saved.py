@@ -200,7 +200,7 @@ def test_a_run_is_saved_whole(run: Run, file: Path, monkeypatch: pytest.MonkeyPa
 def test_without_pyarrow(run: Run, file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     for action in (lambda: run.save(file), lambda: Run.load(file)):
-        with pytest.raises(MissingExtraError, match=r"minisim\[parquet\]"):
+        with pytest.raises(MissingExtraError, match=r"minisim-traffic\[parquet\]"):
             action()
 
 
