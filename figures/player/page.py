@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import json
+import re
 from importlib import resources
 
 from figures.player.ground import look
@@ -43,10 +44,7 @@ def page(one: Scene, other: Scene | None = None) -> str:
         "scenes": dumped(scenes).replace("<", r"\u003c"),
         "player": script(),
     }
-    text = _file("template.html")
-    for name, value in fields.items():
-        text = text.replace(f"{{{{{name}}}}}", value, 1)
-    return text
+    return template("template.html", **fields)
 
 
 def script() -> str:
@@ -70,6 +68,11 @@ def different_arrivals(one: Scene, other: Scene) -> str:
         if ways[0] != ways[1]:
             return f"vehicle {vehicle} takes {ways[0]} and {ways[1]}"
     return ""
+
+
+def template(name: str, **fields: str) -> str:
+    """A template of this folder, with its fields filled in."""
+    return re.sub(r"\{\{(\w+)\}\}", lambda found: fields[found[1]], _file(name))
 
 
 def _file(name: str) -> str:

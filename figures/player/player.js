@@ -251,10 +251,11 @@ class Pane {
     const data = scene.data;
     this.figure = player.make("figure", "pane");
     const caption = player.make("figcaption", "", this.figure);
-    player.make("b", "", caption).textContent = data.controller;
-    player.make("span", "what", caption).textContent = `${data.title} · ${data.demand} · profile ${data.profile} · seed ${data.seed}`;
+    const name = player.make("b", "", caption);
+    name.textContent = name.title = data.controller;
     this.counts = player.make("span", "counts", caption);
     this.counts.title = "standing: vehicles in the picture that stand; served: those that have left the junction since the start of the scene, without a collision";
+    player.make("span", "what", caption).textContent = `${data.title} · ${data.demand} · profile ${data.profile} · seed ${data.seed}`;
     this.canvas = player.make("canvas", "junction", this.figure);
     this.canvas.setAttribute("role", "img");
     this.canvas.setAttribute("aria-label", `The junction under ${data.controller}, seen from above; click a vehicle to ask why it waits`);
@@ -285,7 +286,7 @@ class Pane {
       const away = Math.hypot(car.x - along * car.ux - x, car.y - along * car.uy - y);
       if (away < least) { best = car; least = away; }
     }
-    const arm = this.scene.ground.arms.findIndex(({ at }) => Math.hypot(at[0] - x, at[1] - y) < 3.5);
+    const arm = this.namePlaces().findIndex((at) => Math.hypot(at[0] - x, at[1] - y) < 3.5);
     if (!best && arm >= 0) this.player.lane = arm;
     this.player.select(best ? best.track.id : null);
     this.player.board.focus({ preventScroll: true });
@@ -508,13 +509,20 @@ class Pane {
     }
   }
 
+  /** Where the names of the arms stand: at the edge of the picture, which may be of another scene. */
+  namePlaces() {
+    const scale = this.player.reach / this.scene.ground.reach;
+    return this.scene.ground.arms.map((arm) => arm.at.map((value) => scale * value));
+  }
+
   drawNames(pen, k, at) {
     const size = Math.max(11, Math.min(20, 1.9 * k));
     pen.font = `700 ${size}px system-ui, sans-serif`;
     pen.textAlign = "center";
     pen.textBaseline = "middle";
+    const places = this.namePlaces();
     this.scene.ground.arms.forEach((arm, lane) => {
-      const [x, y] = at(arm.at);
+      const [x, y] = at(places[lane]);
       pen.beginPath();
       pen.arc(x, y, 0.85 * size, 0, 2 * Math.PI);
       pen.fillStyle = this.player.look("ink");
@@ -590,7 +598,7 @@ class Pane {
     pen.textAlign = "right";
     for (const metres of [0, 50, 100]) pen.fillText(metres ? `−${metres}` : "0 m", left - 4, y(stop - metres));
     pen.textAlign = "left";
-    pen.fillText(`lane ${ground.arms[lane].name}: metres from its hold line`, left, 0.7 * em);
+    pen.fillText(`lane ${ground.arms[lane].name}: distance [m]`, left, 0.7 * em);
     pen.textAlign = "center";
     for (let t = Math.ceil((time - HALF_STRIP) / 10) * 10; t <= time + HALF_STRIP; t += 10)
       if (x(t) > left + 14 && x(t) < right - 14) pen.fillText(`${t} s`, x(t), height - 0.7 * em);
@@ -875,14 +883,18 @@ class Player extends HTMLElement {
     const narrow = this.clientWidth < 760, runs = this.panes.length;
     this.board.classList.toggle("narrow", narrow);
     const full = this.hasAttribute("fill") ? this.clientHeight : Math.min(0.85 * window.innerHeight, 720);
-    const captions = this.panes.map((it) => it.figure.firstChild.offsetHeight);
-    const room = full - this.controls.offsetHeight - 26;
-    const side = narrow
-      ? Math.min(this.clientWidth - 16, (room - captions.reduce((a, b) => a + b, 0) - 6 * runs) / runs)
-      : Math.min((this.clientWidth - 330 - 10 * runs) / runs, room - Math.max(...captions));
-    this.style.setProperty("--side", `${Math.max(Math.floor(side), 150)}px`);
+    let side = 0, captions = [];
+    for (let twice = 0; twice < 2; twice++) { // a caption may need more lines in a smaller picture
+      captions = this.panes.map((it) => it.figure.firstChild.offsetHeight);
+      const room = full - this.controls.offsetHeight - 26;
+      side = Math.max(150, Math.floor(narrow
+        ? Math.min(this.clientWidth - 16, (room - captions.reduce((a, b) => a + b, 0) - 6 * runs) / runs)
+        : Math.min((this.clientWidth - 330 - 10 * runs) / runs, room - Math.max(...captions))));
+      this.style.setProperty("--side", `${side}px`);
+    }
     this.style.setProperty("--full", `${Math.floor(full)}px`);
-    const home = runs > 1 && !narrow ? this.controls.parentNode : this.panel;
+    const below = full - Math.max(...captions) - side - this.controls.offsetHeight - 40;
+    const home = runs > 1 && !narrow && below > 110 ? this.controls.parentNode : this.panel;
     if (this.notes.parentNode !== home) home.append(this.notes);
     for (const pane of this.panes) pane.ground.width = 0;
     this.draw();

@@ -48,7 +48,7 @@ def scene(
     """`seconds` of a run from `start` on [s], as plain data.
 
     What was not recorded is run again (`figures.whole` says what that costs). Without `reasons`
-    it is quicker: nothing has to be explained.
+    it is quicker: nothing has to be explained, and signal heads are there only if they are known.
 
     Raises `InputError` for times that the run does not have, and for a run in SUMO that was not
     recorded.
@@ -85,7 +85,7 @@ def scene(
         },
         "tracks": tracks,
         "reasons": _reasons(run, clock, {track["id"] for track in tracks}) if reasons else None,
-        "heads": _heads(run, clock),
+        "heads": _heads(run, clock) if reasons or run.heads is not None else [],
         "collisions": [
             [clock.step_at(it.time), *it.vehicles]
             for it in run.collisions

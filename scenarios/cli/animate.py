@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated
 
@@ -97,7 +98,7 @@ def animate(
         for name in (controller, beside) if name is not None
     ]  # fmt: skip
     end = begin + seconds
-    recording = {"record": "all", "record_window": (begin, end), "explain": not film}
+    recording = {"record": "all", "record_window": (begin, math.inf), "explain": not film}
     runs = [recipe.run(simulate, until=end, **recording) for recipe in recipes]
     with bar("drawing") as progress:
         if film:
