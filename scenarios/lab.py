@@ -58,7 +58,7 @@ class Setting:
     def __str__(self) -> str:
         """As `read` reads it; without what is as by default."""
         return urlencode([
-            (it.name, getattr(self, it.name))
+            (it.name, str(getattr(self, it.name)).removesuffix(".0"))
             for it in parameters(Setting)
             if getattr(self, it.name) != it.default
         ])  # fmt: skip

@@ -12,7 +12,6 @@ import secrets
 import sys
 import tempfile
 import threading
-from collections.abc import Callable
 from functools import lru_cache
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -53,7 +52,7 @@ _ONE_AT_A_TIME = threading.Lock()
 
 
 class Lab(ThreadingHTTPServer):
-    """The server. Its `address` is the page, `serve_forever` and `server_close` run and end it.
+    """The server. Its `address` is the page, `serve_forever` and `shutdown` run and end it.
 
     Port 0 stands for any free one. Raises `InputError` for a port that is in use.
     """
@@ -193,13 +192,3 @@ def _asked(query: str, **more: str) -> tuple[Setting, dict[str, str]]:
     pairs = parse_qsl(query, keep_blank_values=True)
     others = more | {name: value for name, value in pairs if name in more}
     return Setting.read(urlencode([it for it in pairs if it[0] not in more])), others
-
-
-def serve(lab: Lab, say: Callable[[str], None]) -> None:
-    """Serve until Ctrl-C."""
-    try:
-        lab.serve_forever()
-    except KeyboardInterrupt:
-        say("stopped")
-    finally:
-        lab.server_close()

@@ -269,7 +269,7 @@ class Pane {
     this.graph = document.createElementNS(SVG, "svg");
     this.graph.setAttribute("class", "graph");
     this.graph.setAttribute("role", "img");
-    this.graph.setAttribute("viewBox", "-120 -100 240 200");
+    this.graph.setAttribute("viewBox", "-105 -94 210 188");
     row.append(this.graph);
     this.strip = player.make("canvas", "strip", row);
     this.strip.setAttribute("role", "img");
@@ -487,7 +487,9 @@ class Pane {
     pen.font = "600 14px system-ui, sans-serif";
     pen.textAlign = "center";
     pen.textBaseline = "middle";
-    const wide = pen.measureText(text).width + 10, up = y - r - 9 > 12 ? y - r - 9 : y + r + 9;
+    const wide = pen.measureText(text).width + 10, room = pen.canvas.clientHeight - 12;
+    const above = y - r - 9, below = y + r + 9; // on the side that is away from the junction
+    const up = (car.y >= 0 ? above > 12 : below > room) ? above : below;
     pen.fillStyle = colour;
     pen.fillRect(x - wide / 2, up - 10, wide, 20);
     pen.fillStyle = "#FFFFFF";
@@ -573,9 +575,9 @@ class Pane {
     }));
     nodes.forEach((it, k) => {
       const [cx, cy] = places[k], on = it.track.id === player.chosen;
-      make("circle", { cx, cy, r: 21, class: `node${it.goes ? " goes" : ""}${on ? " chosen" : ""}` });
-      make("text", { x: cx, y: cy - 2, class: it.goes ? "goes" : "" }, scene.ways[it.track.way].name);
-      make("text", { x: cx, y: cy + 12, class: `small${it.goes ? " goes" : ""}` }, it.track.id);
+      make("circle", { cx, cy, r: 23, class: `node${it.goes ? " goes" : ""}${on ? " chosen" : ""}` });
+      make("text", { x: cx, y: cy - 1, class: it.goes ? "goes" : "" }, scene.ways[it.track.way].name);
+      make("text", { x: cx, y: cy + 14, class: `small${it.goes ? " goes" : ""}` }, it.track.id);
     });
     if (!nodes.length) make("text", { x: 0, y: 0, class: "small" }, "no vehicle near the junction");
     const list = (some) => some.map((it) => `${scene.ways[it.track.way].name} (vehicle ${it.track.id})`).join(", ") || "none";
@@ -600,7 +602,8 @@ class Pane {
     pen.textAlign = "left";
     pen.fillText(`lane ${ground.arms[lane].name}: distance [m]`, left, 0.7 * em);
     pen.textAlign = "center";
-    for (let t = Math.ceil((time - HALF_STRIP) / 10) * 10; t <= time + HALF_STRIP; t += 10)
+    const every = right - left < 14 * em ? 20 : 10;
+    for (let t = Math.ceil((time - HALF_STRIP) / every) * every; t <= time + HALF_STRIP; t += every)
       if (x(t) > left + 14 && x(t) < right - 14) pen.fillText(`${t} s`, x(t), height - 0.7 * em);
     pen.save();
     pen.beginPath();
@@ -777,7 +780,7 @@ class Player extends HTMLElement {
     row("body", "goes", "has the right of way; band: its way");
     row("body", "stands", "stands");
     row("body", "moves", "moves");
-    row("arrow", "ink", "on the roof: to its exit; lamps blink if it turns");
+    row("arrow", "ink", "to its exit; lamps blink if it turns");
     if (some((it) => it.tracks.some((track) => track.human))) row("body outline", "moves", "dark outline: human driver");
     if (some((it) => it.data.collisions.length)) row("cross", "ink", "crossed out: has collided");
     if (some((it) => !it.heads.size)) {
@@ -789,7 +792,7 @@ class Player extends HTMLElement {
     const zones = new Map(scenes.flatMap((it) => it.ground.zones.map((zone) => [zone.name, zone.words])));
     for (const [name, words] of zones) row(`zone ${name}`, name, words);
     row("ring", "ink", "the chosen vehicle");
-    row("ring dashed", "stands", "a vehicle that it waits for, with its way");
+    row("ring dashed", "stands", "what it waits for, with its way");
     this.legend.replaceChildren(...rows.map(([kind, colour, text, extra]) => {
       const item = this.make("li"), swatch = this.make("i", kind, item);
       swatch.style.setProperty("--colour", kind.startsWith("zone") ? this.zone(colour) : this.look(colour));
@@ -883,19 +886,23 @@ class Player extends HTMLElement {
     const narrow = this.clientWidth < 760, runs = this.panes.length;
     this.board.classList.toggle("narrow", narrow);
     const full = this.hasAttribute("fill") ? this.clientHeight : Math.min(0.85 * window.innerHeight, 720);
+    const panel = runs > 1 ? Math.max(345, 0.275 * this.clientWidth) : 330;
     let side = 0, captions = [];
     for (let twice = 0; twice < 2; twice++) { // a caption may need more lines in a smaller picture
       captions = this.panes.map((it) => it.figure.firstChild.offsetHeight);
       const room = full - this.controls.offsetHeight - 26;
       side = Math.max(150, Math.floor(narrow
         ? Math.min(this.clientWidth - 16, (room - captions.reduce((a, b) => a + b, 0) - 6 * runs) / runs)
-        : Math.min((this.clientWidth - 330 - 10 * runs) / runs, room - Math.max(...captions))));
+        : Math.min((this.clientWidth - panel - 10 * runs) / runs, room - Math.max(...captions))));
       this.style.setProperty("--side", `${side}px`);
     }
     this.style.setProperty("--full", `${Math.floor(full)}px`);
     const below = full - Math.max(...captions) - side - this.controls.offsetHeight - 40;
     const home = runs > 1 && !narrow && below > 110 ? this.controls.parentNode : this.panel;
     if (this.notes.parentNode !== home) home.append(this.notes);
+    // A canvas is sharp if its edges are on whole pixels, so the graph beside it is as wide as some.
+    const inner = this.reports.clientWidth - 24;
+    this.style.setProperty("--graph", `${Math.min(320, narrow && inner < 430 ? inner : Math.floor(0.4 * inner))}px`);
     for (const pane of this.panes) pane.ground.width = 0;
     this.draw();
   }

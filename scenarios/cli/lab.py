@@ -29,13 +29,16 @@ def lab(
 
     begun = Setting.read(setting.rpartition("#")[2])
     integer("--port", port, low=0, high=65535)
-    from figures.player.lab import Lab, serve
+    from figures.player.lab import Lab
 
-    server = Lab(port)
-    address = f"{server.address}#{begun}" if str(begun) else server.address
-    typer.echo(f"The lab is at {address}\nCtrl-C stops it.")
-    if open_it:
-        import webbrowser
+    with Lab(port) as server:
+        address = f"{server.address}#{begun}" if str(begun) else server.address
+        try:
+            typer.echo(f"The lab is at {address}\nCtrl-C stops it.")
+            if open_it:
+                import webbrowser
 
-        webbrowser.open(address)
-    serve(server, typer.echo)
+                webbrowser.open(address)
+            server.serve_forever()
+        except KeyboardInterrupt:
+            typer.echo("stopped")

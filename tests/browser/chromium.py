@@ -86,6 +86,11 @@ class Page:
         )
         self.ask("Input.dispatchKeyEvent", type="keyUp", **event)
 
+    def busy(self) -> float:
+        """CPU time that the page's thread has spent so far [s]: a busy machine makes it no longer."""
+        metrics = self.ask("Performance.getMetrics")["metrics"]
+        return next(float(it["value"]) for it in metrics if it["name"] == "TaskDuration")
+
     def picture(self, path: Path) -> None:
         """Save what is seen as a PNG."""
         path.write_bytes(base64.b64decode(self.ask("Page.captureScreenshot")["data"]))
@@ -123,6 +128,7 @@ class Browser:
         page = self._pages[session] = Page(self, session)
         for domain in ("Page", "Runtime", "Network", "Log"):
             page.ask(f"{domain}.enable")
+        page.ask("Performance.enable", timeDomain="threadTicks")
         motion = {"name": "prefers-reduced-motion", "value": "reduce" if calm else "no-preference"}
         page.ask("Emulation.setEmulatedMedia", features=[motion])
         return page

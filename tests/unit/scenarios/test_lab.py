@@ -42,6 +42,7 @@ def test_an_address_holds_a_setting(setting: Setting) -> None:
 def test_the_default_needs_no_words() -> None:
     assert str(Setting()) == ""
     assert Setting.read("") == Setting()
+    assert str(Setting(density=200.0, humans=0.5)) == "density=200&humans=0.5"
 
 
 @pytest.mark.parametrize(

@@ -144,11 +144,13 @@ def test_ctrl_c_stops_it_cleanly() -> None:
     with subprocess.Popen(
         command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE
     ) as process:
-        assert process.stdout is not None
-        said = process.stdout.readline().decode()
-        assert re.fullmatch(r"The lab is at http://127\.0\.0\.1:\d+/[\w-]+/#density=200\n", said)
-        process.stdout.readline()
-        time.sleep(0.2)  # until it serves
-        process.send_signal(signal.SIGINT)
-        rest, errors = process.communicate(timeout=20)
+        try:
+            assert process.stdout is not None
+            said = process.stdout.readline().decode() + process.stdout.readline().decode()
+            process.send_signal(signal.SIGINT)
+            rest, errors = process.communicate(timeout=20)
+        finally:
+            process.kill()
+    found = r"The lab is at http://127\.0\.0\.1:\d+/[\w-]+/#density=200\nCtrl-C stops it\.\n"
+    assert re.fullmatch(found, said)
     assert (process.returncode, rest, errors) == (0, b"stopped\n", b"")

@@ -72,4 +72,4 @@ def test_the_player_has_the_look_of_the_figures() -> None:
     used = set(re.findall(r"var\(--([\w-]+)\)", text)) | set(
         re.findall(r'look\("([\w-]+)"\)', text)
     )
-    assert used - {"side", "full", "colour"} <= set(re.findall(r"--([\w-]+): #", text))
+    assert used - {"side", "full", "graph", "colour"} <= set(re.findall(r"--([\w-]+): #", text))

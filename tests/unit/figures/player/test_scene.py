@@ -146,10 +146,15 @@ def test_an_empty_road_is_a_scene_too() -> None:
     assert scene(run, seconds=10.0)["tracks"] == []
 
 
-@pytest.mark.parametrize(("seconds", "most"), [(60.0, 150_000), (600.0, 1_200_000)])
-def test_a_scene_is_small_and_quick(seconds: float, most: int) -> None:
-    """Four arms at 350 vehicles per hour and lane, with reasons; under half of the time allowed."""
-    run = minisim.simulate(four_way(350, horizon=700.0), FixedTime(), record="all", explain=True)
+@pytest.mark.parametrize(
+    ("seconds", "most"),
+    [(60.0, 150_000), pytest.param(600.0, 1_200_000, marks=pytest.mark.slow)],
+)
+@pytest.mark.parametrize("controller", [Dim(), FixedTime()])
+def test_a_scene_is_small_and_quick(controller: Any, seconds: float, most: int) -> None:
+    """Four arms at 350 vehicles per hour and lane, with reasons."""
+    what = four_way(350, horizon=60.0 + seconds)
+    run = minisim.simulate(what, controller, record="all", explain=True)
     begin = time.process_time()
     text = dumped(scene(run, start=60.0, seconds=seconds))
     assert time.process_time() - begin < 1.0
