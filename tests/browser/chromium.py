@@ -87,7 +87,7 @@ class Page:
         self.ask("Input.dispatchKeyEvent", type="keyUp", **event)
 
     def busy(self) -> float:
-        """CPU time that the page's thread has spent so far [s]: a busy machine makes it no longer."""
+        """CPU time that the page's thread has spent so far [s], on a busy machine, too."""
         metrics = self.ask("Performance.getMetrics")["metrics"]
         return next(float(it["value"]) for it in metrics if it["name"] == "TaskDuration")
 

@@ -72,7 +72,9 @@ def test_wrong_settings_are_told_in_a_sentence(text: str, said: str) -> None:
     [
         "gate=harmonious&density=300&seed=2&seconds=60&humans=0.3",
         "controller=fixed-time&arms=3&profile=fair&seconds=60&error=0.2&beside=dim&seed=1",
-        "arms=6&seconds=60&error=0.1&beside=reservation&humans=0.2",
+        pytest.param(
+            "arms=6&seconds=60&error=0.1&beside=reservation&humans=0.2", marks=pytest.mark.slow
+        ),
     ],
 )
 def test_the_command_line_shows_the_same(text: str, tmp_path: Path) -> None:

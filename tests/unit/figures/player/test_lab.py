@@ -139,6 +139,7 @@ def test_a_port_in_use_is_told(lab: Lab) -> None:
         Lab(lab.server_port)
 
 
+@pytest.mark.slow
 def test_ctrl_c_stops_it_cleanly() -> None:
     command = [sys.executable, "-m", "minisim", "lab", "density=200"]
     with subprocess.Popen(
