@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import accumulate
 
 import numpy as np
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from figures.player import vlq
@@ -19,6 +19,7 @@ def test_the_examples_of_source_maps() -> None:
     assert texts == ["A", "C", "D", "e", "f", "gB", "qxmvrH"]
 
 
+@settings(max_examples=30)
 @given(PARTS)
 def test_what_is_encoded_is_decoded(parts: list[list[int]]) -> None:
     starts = np.array([0, *accumulate(map(len, parts))][:-1])
@@ -26,6 +27,7 @@ def test_what_is_encoded_is_decoded(parts: list[list[int]]) -> None:
     assert [vlq.decoded(text) for text in texts] == parts
 
 
+@settings(max_examples=30)
 @given(PARTS)
 def test_second_differences_add_up_again(parts: list[list[int]]) -> None:
     starts = np.array([0, *accumulate(map(len, parts))][:-1])
