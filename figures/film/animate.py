@@ -48,7 +48,7 @@ def write_animation(
     run: Run, path: str | os.PathLike[str], *, start: float = 0.0, seconds: float = 60.0,
     fps: float = 10.0, progress: Callable[[int, int], None] | None = None,
 ) -> None:  # fmt: skip
-    """Write `seconds` of a run as a .gif or .mp4; see `write_player` for a page.
+    """Write `seconds` of a run as a .gif or .mp4; see `play` for a page.
 
     What was not recorded is run again (`figures.whole` says what that costs). There are `fps`
     frames per second, at most one per step, and 50 in a GIF; `progress` gets frames done and the

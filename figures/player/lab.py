@@ -20,7 +20,7 @@ from typing import Any
 from urllib.parse import parse_qsl, urlencode, urlsplit
 
 from figures.film.animate import write_animation
-from figures.player.page import page, script, template
+from figures.player.page import Player, script, template
 from figures.player.scene import dumped, scene
 from minisim.errors import InputError, MinisimError, choice, number
 from minisim.parameters import parameters
@@ -178,7 +178,7 @@ def exported(name: str, query: str) -> bytes:
     count = len(setting.recipes) if name == "film.html" else 1
     runs = [_run(setting, which, explained=True) for which in range(count)]
     if name == "film.html":
-        return page(*(scene(run, **when) for run in runs)).encode()
+        return Player(*(scene(run, **when) for run in runs)).page().encode()
     if name == "scene.json":
         return dumped(scene(runs[0], **when)).encode()
     with tempfile.TemporaryDirectory() as folder:

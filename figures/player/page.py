@@ -1,4 +1,4 @@
-"""A web page that plays one run or two side by side, in one file that needs no other."""
+"""A player of one run or two side by side, as a web page in one file that needs no other."""
 
 from __future__ import annotations
 
@@ -13,38 +13,57 @@ from minisim.errors import InputError
 from minisim.files import AnyPath, write_text
 from minisim.results.run import Run
 
+#: Height of a player in a notebook [px].
+HEIGHT = 580
 
-def write_player(
-    path: AnyPath, run: Run, beside: Run | None = None, *, start: float = 0.0, seconds: float = 60.0
-) -> None:
-    """Write a page that plays `seconds` of a run from `start` on [s], perhaps `beside` another one.
 
-    Click a vehicle there to read why it waits. Two runs share one clock.
+class Player:
+    """One run, or two side by side on one clock, as `play` makes it.
 
-    Raises `InputError` as `scene`, or for runs with different arrivals, and `FileError` if the file
-    cannot be written.
+    It shows itself in a notebook, and `save` writes it as a web page of its own.
+
+    Raises `InputError` for two scenes of different arrivals.
+    """
+
+    def __init__(self, one: Scene, other: Scene | None = None) -> None:
+        self.scenes = (one,) if other is None else (one, other)
+        if other is not None and (different := different_arrivals(one, other)):
+            raise InputError(f"two runs side by side need the same arrivals: {different}")
+
+    def save(self, path: AnyPath) -> None:
+        """Write the page, whole or not at all; raises `FileError`."""
+        write_text(path, self.page())
+
+    def page(self, attributes: str = "autoplay") -> str:
+        """The page as a text; `attributes` are those of the element `minisim-player`."""
+        names = " beside ".join(it["controller"] for it in self.scenes)
+        fields = {
+            "title": html.escape(f"{self.scenes[0]['title']} · {names}"),
+            "attributes": attributes,
+            "scenes": dumped(self.scenes).replace("<", r"\u003c"),
+            "player": script(),
+        }
+        return template("template.html", **fields)
+
+    def _repr_html_(self) -> str:
+        """A frame of its own, which shares no style, key or script with the notebook."""
+        held = self.page("").replace("&", "&amp;").replace("'", "&#39;")
+        style = f"width: 100%; height: {HEIGHT}px; border: 0"
+        return f"<iframe sandbox='allow-scripts' style='{style}' srcdoc='{held}'></iframe>"
+
+
+def play(
+    run: Run, beside: Run | None = None, *, start: float = 0.0, seconds: float = 60.0
+) -> Player:
+    """`seconds` of a run from `start` on [s], perhaps `beside` another one, to look at.
+
+    Click a vehicle there to read why it waits. Two runs share one clock. For example,
+    `play(run, start=300).save("film.html")`.
+
+    Raises `InputError` as `scene`, and for runs with different arrivals.
     """
     runs = [run] if beside is None else [run, beside]
-    write_page(path, *(scene(it, start=start, seconds=seconds) for it in runs))
-
-
-def write_page(path: AnyPath, one: Scene, other: Scene | None = None) -> None:
-    """Write a page that plays one scene or two; raises as `write_player`."""
-    write_text(path, page(one, other))
-
-
-def page(one: Scene, other: Scene | None = None) -> str:
-    """The page as a text; see `write_page`."""
-    scenes = [one] if other is None else [one, other]
-    if other is not None and (different := different_arrivals(one, other)):
-        raise InputError(f"two runs side by side need the same arrivals: {different}")
-    names = " beside ".join(it["controller"] for it in scenes)
-    fields = {
-        "title": html.escape(f"{one['title']} · {names}"),
-        "scenes": dumped(scenes).replace("<", r"\u003c"),
-        "player": script(),
-    }
-    return template("template.html", **fields)
+    return Player(*(scene(it, start=start, seconds=seconds) for it in runs))
 
 
 def script() -> str:

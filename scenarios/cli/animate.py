@@ -64,7 +64,7 @@ def animate(
     """Show a run: a page that says why each vehicle waits, or an animation."""
     from figures.film.animate import frame_times, write_animation
     from figures.film.encode import animation_format
-    from figures.player.page import write_player
+    from figures.player.page import play
     from figures.player.scene import scene as scene_of
     from figures.player.scene import write_scene
     from figures.style import suffix_of
@@ -104,7 +104,7 @@ def animate(
         if film:
             write_animation(runs[0], out, start=begin, seconds=seconds, fps=rate, progress=progress)
         elif kind == "html":
-            write_player(out, *runs, start=begin, seconds=seconds)
+            play(*runs, start=begin, seconds=seconds).save(out)
         else:
             write_scene(scene_of(runs[0], start=begin, seconds=seconds), out)
     typer.echo(f"wrote {out}")

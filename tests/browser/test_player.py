@@ -8,11 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from PIL import Image
 
 import minisim
 from baselines import FixedTime
 from dim import Dim
-from figures.player.page import page, script, write_page
+from figures import Player, play
+from figures.player.page import HEIGHT, script
 from figures.player.scene import dumped, scene
 from minisim.control import Unregulated
 from minisim.results.run import Run
@@ -53,7 +55,7 @@ def files(runs: list[Run], tmp_path_factory: pytest.TempPathFactory) -> dict[str
     one, two = (scene(it, start=START, seconds=SECONDS) for it in runs)
     named = {"one": (one,), "two": (one, two), "signal": (two,)}
     for name, scenes in named.items():
-        write_page(folder / f"{name}.html", *scenes)
+        Player(*scenes).save(folder / f"{name}.html")
     return {name: folder / f"{name}.html" for name in named}
 
 
@@ -321,11 +323,45 @@ def test_two_players_on_one_page(browser: Browser, runs: list[Run], tmp_path: Pa
 
 
 @pytest.mark.slow
+def test_two_players_in_one_notebook(browser: Browser, runs: list[Run], tmp_path: Path) -> None:
+    """As a saved notebook holds them: what one does, the other does not."""
+    shows = "".join(play(it, start=START, seconds=SECONDS)._repr_html_() for it in runs)
+    file = tmp_path / "notebook.html"
+    file.write_text(f'<!doctype html><link rel="icon" href="data:,">{shows}', encoding="utf-8")
+    shown = browser.page()
+    shown.size(1000, 2 * HEIGHT + 40)
+    shown.open(file.as_uri())
+
+    def looks() -> list[Image.Image]:
+        shown.picture(tmp_path / "seen.png")
+        seen = Image.open(tmp_path / "seen.png")
+        return [seen.crop((20, y + 70, 400, y + 400)) for y in (8, 8 + HEIGHT)]  # the junctions
+
+    def until(changed: tuple[bool, bool]) -> list[Image.Image]:
+        for _ in range(100):
+            now = looks()
+            if tuple(a != b for a, b in zip(before, now, strict=True)) == changed:
+                return now
+        raise AssertionError(f"never changed as {changed}")
+
+    shown.run("new Promise((done) => setTimeout(done, 500))")
+    before = looks()
+    shown.click(45, HEIGHT - 30)  # the first one's play button
+    before = until((True, False))
+    shown.press(" ")
+    before = looks()
+    assert looks() == before, "Space stops the one that was clicked"
+    shown.click(45, 2 * HEIGHT - 30)
+    until((False, True))
+    at_rest(shown, file)
+
+
+@pytest.mark.slow
 def test_a_collision_is_counted(browser: Browser, tmp_path: Path) -> None:
     crash = replayed(four_way(), (0.0, 0, 2), (0.0, 1, 2), horizon=60.0)
     run = minisim.simulate(crash, Unregulated(), record="all", on_collision="record", explain=True)
     file = tmp_path / "crash.html"
-    file.write_text(page(scene(run, start=20.0, seconds=35.0)), encoding="utf-8")
+    Player(scene(run, start=20.0, seconds=35.0)).save(file)
     shown = opened(browser, file, (1280, 720))
     shown.run(f"{PLAYER}.time = {PLAYER}.last")
     assert shown.run(f"{PART}('.counts').textContent").startswith("collisions 1 · standing")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +13,8 @@ import pytest
 import minisim
 from baselines import FixedTime
 from dim import Dim
-from figures import scene, style, write_page, write_player
-from figures.player.page import page, script
+from figures import Player, play, scene, style
+from figures.player.page import script
 from minisim.errors import InputError
 from scenarios import four_way
 
@@ -27,7 +28,7 @@ def pair() -> list[dict[str, Any]]:
 
 
 def test_the_page_holds_the_scenes_and_nothing_from_elsewhere(pair: list[dict[str, Any]]) -> None:
-    text = page(*pair)
+    text = Player(*pair).page()
     assert "{{" not in text
     (held,) = re.findall(r'<script type="application/json">(.*?)</script>', text)
     assert json.loads(held) == pair
@@ -38,30 +39,51 @@ def test_the_page_holds_the_scenes_and_nothing_from_elsewhere(pair: list[dict[st
 
 def test_names_cannot_break_out_of_the_page(pair: list[dict[str, Any]]) -> None:
     name = '</script><script>alert("x")</script>'
-    text = page(pair[0] | {"title": name, "controller": name})
+    text = Player(pair[0] | {"title": name, "controller": name}).page()
     assert text.count("<script") == 2
     (held,) = re.findall(r'<script type="application/json">(.*?)</script>', text)
     assert json.loads(held)[0]["title"] == name
 
 
-def test_two_runs_need_the_same_arrivals(pair: list[dict[str, Any]], tmp_path: Path) -> None:
+def test_two_runs_need_the_same_arrivals(pair: list[dict[str, Any]]) -> None:
     for change in ({"seed": 1}, {"demand": "x"}, {"title": "five-way"}):
         with pytest.raises(InputError, match="the same arrivals"):
-            write_page(tmp_path / "two.html", pair[0], pair[1] | change)
+            Player(pair[0], pair[1] | change)
     other = json.loads(json.dumps(pair[1]))
     known = {track["id"] for track in pair[0]["tracks"]}
     track = next(it for it in other["tracks"] if it["id"] in known)
     track["way"] = (track["way"] + 1) % len(other["ways"])
     with pytest.raises(InputError, match=f"vehicle {track['id']} takes"):
-        write_page(tmp_path / "two.html", pair[0], other)
-    assert not list(tmp_path.iterdir())
+        Player(pair[0], other)
 
 
 def test_a_player_of_two_runs(pair: list[dict[str, Any]], tmp_path: Path) -> None:
     what, file = four_way(300, horizon=40.0), tmp_path / "two.html"
     runs = [minisim.simulate(what, it) for it in (Dim(), FixedTime())]
-    write_player(file, *runs, start=30.0, seconds=5.0)
-    assert file.read_text(encoding="utf-8") == page(*pair)
+    play(*runs, start=30.0, seconds=5.0).save(file)
+    assert file.read_text(encoding="utf-8") == Player(*pair).page()
+
+
+class Frames(HTMLParser):
+    """What the frames of a page hold."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.held: list[dict[str, str | None]] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        assert tag == "iframe"
+        self.held.append(dict(attrs))
+
+
+def test_in_a_notebook_it_is_a_frame_of_its_own(pair: list[dict[str, Any]]) -> None:
+    quoted = pair[0] | {"title": """<b>'a' & "b"</b>"""}
+    frames = Frames()
+    frames.feed(Player(quoted)._repr_html_())
+    (frame,) = frames.held
+    assert frame["srcdoc"] == Player(quoted).page("")
+    assert frame["sandbox"] == "allow-scripts"
+    assert "<minisim-player fill >" in Player(quoted).page(""), "several would start at once"
 
 
 def test_the_player_has_the_look_of_the_figures() -> None:
