@@ -158,7 +158,7 @@ def test_in_a_notebook_the_kernel_answers(browser: Browser, tmp_path: Path) -> N
         return told
 
     assert questions() == [f"seconds=60&run=0&explained={k}" for k in (0, 1)]
-    for _ in range(5):  # into the frame, and to the slider of the arms
+    for _ in range(4):  # to the summary, in the frame, and on to the slider of the arms
         shown.press("Tab")
     shown.press("ArrowRight")
     assert questions()[-1] == "arms=5&seconds=60&run=0&explained=1"
