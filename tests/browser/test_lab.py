@@ -158,12 +158,12 @@ def test_in_a_notebook_the_kernel_answers(browser: Browser, tmp_path: Path) -> N
         return told
 
     assert questions() == [f"seconds=60&run=0&explained={k}" for k in (0, 1)]
-    for _ in range(8):  # into the frame, and from control to control until a slider moves
+    for _ in range(8):  # into the frame, and from control to control until one changes
         shown.press("Tab")
         shown.press("ArrowRight")
         if shown.run("new Promise((done) => setTimeout(() => done(asked.length), 400))"):
             break
-    assert questions()[-1] == "arms=5&seconds=60&run=0&explained=1"
+    assert questions()[-1].endswith("&seconds=60&run=0&explained=1")
     assert shown.errors == []
     assert set(shown.requests) - {"about:srcdoc"} == {file.as_uri()}
     shown.run("stop()")
