@@ -93,7 +93,7 @@ class Scene {
       if (!this.heads.has(lane)) this.heads.set(lane, []);
       this.heads.get(lane).push([step, state]);
     }
-    // Somebody gets the right of way, or a head turns: these are decisions.
+    // A vehicle gets the right of way, or a head turns: these are decisions.
     const decisions = new Set();
     for (const track of this.tracks)
       track.states.forEach(([step, state], k) => {
@@ -662,7 +662,6 @@ class Player extends HTMLElement {
     this.shadowRoot.append(sheet);
     this.panes = [];
     this.chosen = null;
-    this.lane = 0;
     this.speed = 1;
     this.playing = false;
     this.still = matchMedia("(prefers-reduced-motion: reduce)").matches;
@@ -744,7 +743,7 @@ class Player extends HTMLElement {
     this.number.placeholder = "none";
     this.number.addEventListener("input", () => this.select(this.number.value === "" ? null : Number(this.number.value), true));
     this.lanes = asked("lane", document.createElement("select"));
-    this.lanes.addEventListener("change", () => { this.lane = Number(this.lanes.value); this.draw(); });
+    this.lanes.addEventListener("change", () => this.draw());
     this.reports = this.make("div", "reports", panel);
     const legend = this.notes = this.make("details", "legend", panel);
     legend.open = true;
@@ -767,8 +766,9 @@ class Player extends HTMLElement {
     this.unit = Math.min(...scenes.map((it) => it.data.step));
     this.slider.max = Math.round((this.last - this.first) / this.unit);
     const arms = scenes[0].ground.arms;
-    this.lane = Math.min(this.lane, arms.length - 1);
-    this.lanes.replaceChildren(...arms.map((arm, k) => new Option(arm.name, k, false, k === this.lane)));
+    const lane = Math.min(Math.max(this.lane, 0), arms.length - 1);
+    this.lanes.replaceChildren(...arms.map((arm, k) => new Option(arm.name, k)));
+    this.lane = lane;
     this.writeLegend();
     this.now = before !== null && before >= this.first && before <= this.last ? before : this.first;
     this.fit();
@@ -802,6 +802,15 @@ class Player extends HTMLElement {
     }));
   }
 
+  /** The index of the lane whose strip is drawn. */
+  get lane() {
+    return this.lanes.selectedIndex;
+  }
+
+  set lane(index) {
+    this.lanes.selectedIndex = index;
+  }
+
   get time() {
     return this.now;
   }
@@ -815,7 +824,7 @@ class Player extends HTMLElement {
     this.chosen = vehicle;
     if (!typed) this.number.value = vehicle ?? "";
     const track = this.panes.flatMap((it) => it.scene.tracks).find((it) => it.id === vehicle);
-    if (track) { this.lane = track.lane; this.lanes.value = track.lane; }
+    if (track) this.lane = track.lane;
     this.draw();
   }
 
