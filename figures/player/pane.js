@@ -314,6 +314,9 @@ class Pane {
       if (first && car) text = first === last ? first.sentence : `${first.sentence}${more} ${last.sentence}`;
       else if (car) text = `Vehicle ${vehicle} is here. This scene has no reasons.`;
       else text = `Vehicle ${vehicle} is not in the scene at this time.`;
+      const struck = scene.data.collisions.filter(([when, ...both]) => when <= this.step && both.includes(vehicle))
+        .map(([, one, other]) => `vehicle ${one === vehicle ? other : one}`);
+      if (struck.length) text = `It has collided with ${struck.join(" and ")}. ${text}`;
     }
     player.write(this.why, text);
   }

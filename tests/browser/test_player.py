@@ -406,6 +406,10 @@ def test_a_collision_is_counted(browser: Browser, tmp_path: Path) -> None:
     shown.run(f"{PLAYER}.time = {PLAYER}.last")
     assert shown.run(f"{PART}('.counts').textContent").startswith("collisions 1 · standing")
     assert shown.run(f"{PART}('.counts').textContent").endswith("served 0")
+    shown.run(f"{PLAYER}.select(1)")
+    assert shown.run(f"{PART}('.why').textContent").startswith(
+        "It has collided with vehicle 0. Veh"
+    )
     assert "2 recorded arrivals" in shown.run(f"{PART}('.what').textContent")
     assert "crossed out" in shown.run(f"{PART}('.legend').textContent")
     at_rest(shown, file)
