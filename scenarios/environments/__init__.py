@@ -1,6 +1,7 @@
 """Environments for learning, in the form of Gymnasium and PettingZoo (extra `gym`).
 
     import gymnasium
+    import scenarios.environments  # makes them known to Gymnasium
 
     env = gymnasium.make("minisim/RightOfWay-v0", scenario=four_way(density=250, horizon=600))
 
@@ -9,30 +10,19 @@ docs/environments.md has the observations, actions and rewards.
 
 from __future__ import annotations
 
-import importlib
-from typing import TYPE_CHECKING
+from minisim.errors import MissingExtraError, extra
 
-if TYPE_CHECKING:
-    from scenarios.environments.right_of_way import RightOfWayEnv
-    from scenarios.environments.signal import SignalEnv
-    from scenarios.environments.vehicles import VehiclesEnv
+try:
+    import gymnasium
+    import pettingzoo  # noqa: F401
+except ImportError as error:
+    raise MissingExtraError(f"environments need {error.name}: {extra('gym')}") from error
 
-__all__ = ["RightOfWayEnv", "SignalEnv", "VehiclesEnv", "register"]
+from scenarios.environments.right_of_way import RightOfWayEnv
+from scenarios.environments.signal import SignalEnv
+from scenarios.environments.vehicles import VehiclesEnv
 
-_HOMES = {"RightOfWayEnv": "right_of_way", "SignalEnv": "signal", "VehiclesEnv": "vehicles"}
+__all__ = ["RightOfWayEnv", "SignalEnv", "VehiclesEnv"]
 
-
-def register() -> None:
-    """Make the environments known to `gymnasium.make`; Gymnasium calls it when it is imported."""
-    from gymnasium.envs import registration
-
-    for name in ("RightOfWay", "Signal"):
-        home = f"scenarios.environments.{_HOMES[f'{name}Env']}:{name}Env"
-        if f"minisim/{name}-v0" not in registration.registry:
-            registration.register(f"minisim/{name}-v0", entry_point=home)
-
-
-def __getattr__(name: str) -> object:
-    if name not in _HOMES:
-        raise AttributeError(f"module 'scenarios.environments' has no attribute {name!r}")
-    return getattr(importlib.import_module(f"scenarios.environments.{_HOMES[name]}"), name)
+gymnasium.register("minisim/RightOfWay-v0", entry_point="scenarios.environments:RightOfWayEnv")
+gymnasium.register("minisim/Signal-v0", entry_point="scenarios.environments:SignalEnv")

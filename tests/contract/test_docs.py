@@ -79,9 +79,6 @@ def test_a_search_looks_ahead(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_an_environment_is_used(capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("gymnasium", reason="needs the extra gym")
-    import scenarios.environments
-
-    scenarios.environments.register()  # as Gymnasium does itself where minisim is installed
     (example,) = blocks("docs/environments.md")
     exec(compile(example, "docs/environments.md", "exec"), {})
     assert int(capsys.readouterr().out) > 30

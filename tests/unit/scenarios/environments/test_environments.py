@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import subprocess
+import sys
 from typing import Any
 
 import numpy as np
@@ -29,7 +31,6 @@ from pettingzoo.utils.conversions import parallel_to_aec  # noqa: E402
 
 import scenarios.environments as environments  # noqa: E402
 
-environments.register()
 NAMES = ("minisim/RightOfWay-v0", "minisim/Signal-v0")
 
 
@@ -295,3 +296,9 @@ def test_horizons_truncate_and_empty_roads_terminate() -> None:
         _, _, *ends, _ = env.step(np.ones(12, np.int8))  # type: ignore[assignment]
     assert ends == [True, False]
     assert env.world.sim.time < 600.0
+
+
+def test_without_the_extra_it_says_what_to_install() -> None:
+    code = "import sys; sys.modules['pettingzoo'] = None; import scenarios.environments"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert "environments need pettingzoo: pip install 'minisim-traffic[gym]'" in done.stderr
