@@ -27,7 +27,7 @@ __all__ = ["COMMANDS", "app", "main"]
 #: The help lists these first, then the others by name.
 _FIRST = (
     "demo", "run", "controllers", "animate", "lab", "sweep", "figures", "reproduce", "benchmark",
-    "crossval",
+    "crossval", "train",
 )  # fmt: skip
 
 #: The names of the commands, in the order of the help.

@@ -29,6 +29,7 @@ def _version(wanted: bool) -> None:
 #: These commands simulate in any case.
 _SIMULATING = (
     "animate", "benchmark", "crossval", "demo", "lab", "optimum", "reproduce", "run", "sweep",
+    "train",
 )  # fmt: skip
 
 
