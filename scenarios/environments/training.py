@@ -44,7 +44,7 @@ class Training(NamedTuple):
     def save(self, path: AnyPath) -> None:
         """Write both as JSON."""
         text = json.dumps({"weights": self.weights, "generations": self.generations}, indent=1)
-        write_text(path, text + "\\n")
+        write_text(path, text + "\n")
 
 
 def read_weights(path: AnyPath) -> tuple[float, ...]:

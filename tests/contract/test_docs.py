@@ -82,3 +82,15 @@ def test_an_environment_is_used(capsys: pytest.CaptureFixture[str]) -> None:
     (example,) = blocks("docs/environments.md")
     exec(compile(example, "docs/environments.md", "exec"), {})
     assert int(capsys.readouterr().out) > 30
+
+
+@pytest.mark.slow
+def test_what_is_learnt_runs() -> None:
+    pytest.importorskip("cma", reason="needs the extra gym")
+    cells = re.findall(
+        r"^```\{code-cell\} ipython3\n(.*?)^```",
+        (ROOT / "docs/learning.md").read_text(),
+        re.S | re.M,
+    )
+    assert len(cells) == 2
+    exec(compile("\n".join(cells), "docs/learning.md", "exec"), {})
