@@ -15,16 +15,15 @@ import numpy as np
 
 from minisim.arrivals import Arrivals
 from minisim.control import (
+    TO_LANES,
+    TO_VEHICLES,
+    Accelerate,
     Advise,
     Brake,
-    Close,
     Command,
     Controller,
     Counting,
-    Go,
-    Hold,
     Kinds,
-    Open,
     Plan,
     Session,
     Site,
@@ -61,9 +60,6 @@ REACTIONS = (*ON_COLLISION, "teleport")
 NEEDED = (
     "name", "profile_name", "density", "horizon", "warmup", "depart_speed", "site", "arrivals",
 )  # fmt: skip
-
-#: Commands by what they address. Building a union of types at each check would be slow.
-TO_VEHICLES, TO_LANES = (Go, Hold, Advise, Brake), (Open, Close)
 
 #: How long a replay goes on after the collision [s].
 AFTERMATH = 2.0
@@ -304,6 +300,8 @@ def check_command(command: Command, tick: int, site: Site, vehicles: int | None 
             number("advised speed [m/s]", command.speed, low=0)
         if isinstance(command, Brake):
             number("deceleration to brake at [m/s²]", command.deceleration, low=0)
+        if isinstance(command, Accelerate) and command.acceleration != math.inf:
+            number("acceleration [m/s²]", command.acceleration)
     elif isinstance(command, TO_LANES):
         integer("lane", command.lane, low=0, high=site.intersection.n - 1)
     elif isinstance(command, Wake):

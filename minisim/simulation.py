@@ -11,6 +11,7 @@ import numpy as np
 
 from minisim.control import (
     NO_REPORTS,
+    Accelerate,
     Advise,
     Brake,
     Close,
@@ -270,6 +271,8 @@ class Simulation:
                 limited = min(asked, float(self._vehicles["b_max"][self._row[vehicle]]))
                 brake = -limited if limited > 0.0 else math.inf
                 self._vehicles["brake"][self._row[vehicle]] = brake
+            case Accelerate(vehicle, told) if not self._vehicles["cleared"][self._row[vehicle]]:
+                self._vehicles["told"][self._row[vehicle]] = told
             case Go(vehicle) | Hold(vehicle):
                 self._vehicles["go"][self._row[vehicle]] = isinstance(command, Go)
             case Open(lane, amber):

@@ -11,13 +11,13 @@ from typing import Any, Literal, NamedTuple, get_args
 
 from minisim.arrivals import Arrivals
 from minisim.control import (
+    TO_VEHICLES,
+    Accelerate,
     Advise,
     Brake,
     Close,
     Command,
     Controller,
-    Go,
-    Hold,
     Open,
     Plan,
     Session,
@@ -200,7 +200,7 @@ def check_commands(commands: Iterable[Command], view: View, site: Site) -> None:
 
 def _problem(command: object, ids: set[int], now: float, lanes: int) -> str | None:
     match command:
-        case Go() | Hold() | Advise() | Brake() if command.vehicle not in ids:
+        case _ if isinstance(command, TO_VEHICLES) and command.vehicle not in ids:
             return "this vehicle is not in the view"
         case Open(lane) | Close(lane) if lane not in range(lanes):
             return f"there is no such lane (0 … {lanes - 1})"
@@ -208,6 +208,8 @@ def _problem(command: object, ids: set[int], now: float, lanes: int) -> str | No
             return "a speed must be at least 0 m/s"
         case Brake(_, deceleration) if not 0.0 <= deceleration < math.inf:
             return "a deceleration must be a number of at least 0 m/s²"
+        case Accelerate(_, acceleration) if not -math.inf < acceleration:
+            return "an acceleration must be a number, or infinite to leave the vehicle to its law"
         case Wake(time) if not now < time < math.inf:
             return "a wake-up must be in the future"
     return None if isinstance(command, get_args(Command)) else "this is not a command"

@@ -12,7 +12,20 @@ carries out the commands that the session returns. Only a plan with a period wak
 
 from __future__ import annotations
 
-from minisim.control.commands import Advise, Brake, Close, Command, Go, Hold, Open, Reserve, Wake
+from minisim.control.commands import (
+    TO_LANES,
+    TO_VEHICLES,
+    Accelerate,
+    Advise,
+    Brake,
+    Close,
+    Command,
+    Go,
+    Hold,
+    Open,
+    Reserve,
+    Wake,
+)
 from minisim.control.cover import NOTHING, ORDINARY, Cover, cover_of
 from minisim.control.plan import Marking, Plan
 from minisim.control.protocols import Controller, Counting, Kinds, Session, as_controller, keeps
@@ -37,6 +50,9 @@ __all__ = [
     "NOTHING",
     "NO_REPORTS",
     "ORDINARY",
+    "TO_LANES",
+    "TO_VEHICLES",
+    "Accelerate",
     "Advise",
     "Brake",
     "Close",

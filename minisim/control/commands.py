@@ -78,10 +78,26 @@ class Brake:
 
 
 @dataclass(frozen=True, slots=True)
+class Accelerate:
+    """Set one vehicle's acceleration [m/s²] until told otherwise; infinity leaves it to its law.
+
+    It takes the place of what the vehicle would do on a free road. What bounds any vehicle bounds
+    this one: its engine and brakes, what its law asks for behind others, limits, advice, its hold
+    line, `Brake`. A vehicle that is at its limit keeps it. It ends like `Brake`.
+    """
+
+    vehicle: int
+    acceleration: float
+
+
+@dataclass(frozen=True, slots=True)
 class Wake:
     """Wake the session at `time` [s] (once; a later `Wake` replaces an earlier one)."""
 
     time: float
 
 
-Command = Go | Hold | Open | Close | Advise | Brake | Wake
+Command = Go | Hold | Open | Close | Advise | Brake | Accelerate | Wake
+
+#: Commands by what they address. Building a union of types at each check would be slow.
+TO_VEHICLES, TO_LANES = (Go, Hold, Advise, Brake, Accelerate), (Open, Close)

@@ -8,14 +8,11 @@ from typing import Any
 
 from minisim.channel import Air, Chances, Channel, steps
 from minisim.control import (
-    Advise,
-    Brake,
+    TO_VEHICLES,
     Command,
     Controller,
     Counting,
     Cover,
-    Go,
-    Hold,
     Plan,
     Radio,
     Reserve,
@@ -177,7 +174,7 @@ class Link:
                 self._alarm.set(command)
             elif isinstance(command, Reserve):
                 self._down.send(now, command)
-            elif isinstance(command, Go | Hold | Advise | Brake):
+            elif isinstance(command, TO_VEHICLES):
                 self._office.take(command)
             else:
                 yield command

@@ -49,6 +49,8 @@ def accelerate(vehicles: Records, lanes: Records, layout: Layout, law: Law, crui
                 u = free(me, layout, law, cruise)
             else:
                 u = cruise_control(v, v0, cruise.cruise_gain, cruise.a, cruise.b)
+            if me["told"] < math.inf:
+                u = told(me, u, law, cruise)
             if cruise.obeys:
                 u = min(u, (allowed(s, v, p, v0, layout, law, cruise) - v) / law.dt)
             nearest = own = tail = math.inf
@@ -128,6 +130,18 @@ def accelerate(vehicles: Records, lanes: Records, layout: Layout, law: Law, crui
                 a = max(min(a, hold(v, s, mine, law)), -mine.b_max)
             me["a"] = a
     return overlap
+
+
+@njit_inner
+def told(me: np.void, u: float, law: Law, cruise: Cruise) -> float:
+    """What a vehicle that nothing hinders asks for if a command sets its acceleration."""
+    v, asked = me["v"], me["told"]
+    if law.model == KRAUSS:
+        asked = min(asked, u)
+    else:
+        top = min(me["advice"], cruise.max_speed)
+        asked = min(asked, max((top - v) / law.dt, -cruise.b))
+    return float(asked if v > 0.0 else max(asked, 0.0))
 
 
 @njit_inner
