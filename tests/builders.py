@@ -188,7 +188,7 @@ PEDALS = (math.inf, math.inf, -1000.0, -9.0, -3.0, -1.0, 0.0, 0.5, 2.0, 1000.0)
 
 @dataclass(frozen=True)
 class Pedals:
-    """A controller that also sets random accelerations of vehicles in view, twice a second."""
+    """A controller that also sets random accelerations of all vehicles up to the exit, twice a second."""
 
     controller: Controller
     seed: int = 0
@@ -197,14 +197,17 @@ class Pedals:
 
     def start(self, site: Site) -> Session:
         session, chance = self.controller.start(site), Random(self.seed)
+        plan = session.plan
 
         def decide(view: View) -> Iterable[Command]:
-            yield from session.decide(view)
+            near = tuple(it for it in view.vehicles if it.distance <= plan.sight)
+            yield from session.decide(view._replace(vehicles=near))
             for vehicle in view.vehicles:
                 if chance.random() < self.often:
                     yield Accelerate(vehicle.id, chance.choice(PEDALS))
 
-        return ScriptedSession(dataclasses.replace(session.plan, period=0.5), decide)
+        sight = site.intersection.approach_length
+        return ScriptedSession(dataclasses.replace(plan, period=0.5, sight=sight), decide)
 
 
 @dataclass(frozen=True)
