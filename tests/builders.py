@@ -188,7 +188,7 @@ PEDALS = (math.inf, math.inf, -1000.0, -9.0, -3.0, -1.0, 0.0, 0.5, 2.0, 1000.0)
 
 @dataclass(frozen=True)
 class Pedals:
-    """A controller that also sets random accelerations of all vehicles up to the exit, twice a second."""
+    """A controller that also sets random accelerations, of all vehicles up to the exit."""
 
     controller: Controller
     seed: int = 0

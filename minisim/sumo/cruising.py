@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from minisim.carfollowing import cruise_control
-from minisim.engine.cruise.law import FASTEST, Cruise, follow, realise
+from minisim.engine.cruise.law import FASTEST, Cruise, follow, obey, realise
 from minisim.errors import InputError
 from minisim.laws import STOP_MARGIN, hold
 from minisim.sumo.messages import Job
@@ -87,8 +87,10 @@ class Cruiser(Steering):
                 held = car.s < law.entry and not released(car)
                 if held and near(car.v, law.hold - car.s, car.traits, law):
                     acc = min(acc, max(hold(car.v, car.s, car.traits, law), -car.traits.b_max))
-                if acc < math.inf and acc < self._own(car, ahead):
-                    self.command(car, car.v + acc * law.dt)
+                told = car.told < math.inf
+                own = self._own(car, ahead) if told or acc < math.inf else -math.inf
+                if told or acc < own:
+                    self.command(car, car.v + min(acc, own) * law.dt)
                 else:
                     self.release(car)
                 ahead = car
@@ -98,6 +100,8 @@ class Cruiser(Steering):
         law, cruise = self._law, self._cruise
         v0 = self._desired(car)
         u = cruise_control(car.v, v0, cruise.cruise_gain, cruise.a, cruise.b)
+        if car.told < math.inf:
+            u = obey(car.told, car.v, min(car.advice, cruise.max_speed), law, cruise)
         if ahead is not None:
             gap = ahead.s - ahead.traits.length - car.traits.min_gap - car.s
             u = min(u, follow(car.v, gap, ahead.v, law, cruise))

@@ -39,7 +39,7 @@ class Car:
     __slots__ = (
         "a", "advice", "brake", "cleared", "commanded", "demand_time", "desired", "factor", "go",
         "id", "ignoring", "lane", "lost_ticks", "mark", "name", "path", "present", "rank", "row",
-        "s", "section", "seen", "traits", "type", "v",
+        "s", "section", "seen", "told", "traits", "type", "v",
     )  # fmt: skip
 
     def __init__(self, row: int, record: Records, types: Sequence[Traits], law: Law) -> None:
@@ -61,7 +61,7 @@ class Car:
         self.seen = 0  # tick of the last look at it
         self.present = False  # on the road
         self.go = self.cleared = self.commanded = self.ignoring = False
-        self.advice = math.inf
+        self.advice = self.told = math.inf
         self.desired = math.inf  # the last value given to SUMO
 
 
@@ -135,7 +135,8 @@ class Follower(Steering):
             for k, car in enumerate(lane):
                 held = car.s < entry and not released(car)
                 crossed = not inside.isdisjoint(self._crossing[car.path])
-                merges = crossed and not held and (car.s >= entry or foremost)
+                alone = crossed or car.told < math.inf  # SUMO does not follow for it
+                merges = alone and not held and (car.s >= entry or foremost)
                 foremost &= car.s >= entry
                 self._steer(car, lane[:k], held, self._merging(car) if merges else 0.0)
                 ignoring = held or crossed
@@ -179,12 +180,11 @@ class Follower(Steering):
         held = held and near(v, law.hold - s, me, law)
         # SUMO would drop to a lower desired speed at once, so the law does the braking.
         self._desire(car, max(v0, v))
-        must_slow = v > v0 or v0 < LEAST_SPEED
-        if not (slower or held or car.brake > 0.0 or must_slow or z > 0.0):
+        ours = v > v0 or v0 < LEAST_SPEED or car.told < math.inf
+        if not (slower or held or car.brake > 0.0 or ours or z > 0.0):
             super().release(car)
             return
-        free = laws.drive(v, limit, car.advice, 0.0, me, law)
-        acc = laws.drive(v, limit, car.advice, z, me, law)
+        free, acc = self._drive(car, limit, 0.0), self._drive(car, limit, z)
         while laws.braking_begins(v, starts[k] - s, me, law):
             lower = speeds[k] * car.factor
             acc = min(acc, laws.slow_down(v, acc, lower, starts[k] - s, me, law))
@@ -193,12 +193,19 @@ class Follower(Steering):
             acc = min(acc, laws.hold(v, s, me, law))
         if car.brake > 0.0:
             acc = min(acc, -car.brake)
-        if acc < free or must_slow:
+        if acc < free or ours:
             z = max(z, self._leading(car, lane))
-            acc = min(acc, laws.drive(v, limit, car.advice, z, me, law))
+            acc = min(acc, self._drive(car, limit, z))
             self.command(car, v + max(acc, -me.b_max) * law.dt)
         else:
             super().release(car)
+
+    def _drive(self, car: Car, limit: float, z: float) -> float:
+        """The acceleration by the law, or by what the car is told."""
+        if car.told < math.inf:
+            limit = min(limit, car.advice)
+            return float(laws.obey(car.told, car.v, limit, z, car.traits, self._law))
+        return float(laws.drive(car.v, limit, car.advice, z, car.traits, self._law))
 
     def _desire(self, car: Car, speed: float) -> None:
         speed = max(speed, LEAST_SPEED)

@@ -18,7 +18,18 @@ from typing import Any
 
 import numpy as np
 
-from minisim.control import Advise, Brake, Close, Command, Go, Hold, Observed, Open, Wake
+from minisim.control import (
+    Accelerate,
+    Advise,
+    Brake,
+    Close,
+    Command,
+    Go,
+    Hold,
+    Observed,
+    Open,
+    Wake,
+)
 from minisim.engine.collision import Collision
 from minisim.engine.state import TRACE, Records
 from minisim.hosting import Alarm
@@ -134,11 +145,24 @@ class Worker:
                 car.advice = speed
                 if car.present:
                     self._steering.advise(car)
+            case Accelerate(vehicle, acceleration):
+                self._reached(vehicle).told = acceleration
             case Brake(vehicle, deceleration):
-                car = self._cars[str(vehicle)]
+                car = self._reached(vehicle)
                 car.brake = min(deceleration, car.traits.b_max)
             case Wake():
                 self._alarm.set(command)
+
+    def _reached(self, vehicle: int) -> Car:
+        """The vehicle that a command drives; if it is far away, all are watched from now on."""
+        car = self._cars[str(vehicle)]
+        if car.s < self._near:
+            self._near = -math.inf
+            self._glances.clear()
+            for it in [it for it in self._cars.values() if it.present]:
+                self._glance(it)
+                self._turn_to(it)
+        return car
 
     def _released(self, car: Car) -> bool:
         return car.go or self._open[car.lane]

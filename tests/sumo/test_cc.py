@@ -12,7 +12,7 @@ import pytest
 import minisim
 from baselines import FixedTime
 from dim import AsRunDim
-from minisim.control import Advise, Controller, Plan, Unregulated
+from minisim.control import Accelerate, Advise, Brake, Command, Controller, Plan, Unregulated
 from minisim.errors import InputError, SumoError
 from minisim.simulation import Run
 from minisim.sumo import simulate
@@ -22,7 +22,7 @@ from scenarios import five_way, four_way
 from scenarios.paper import Cell, controller_of, replay
 from scenarios.profiles import AS_RUN, FAIR
 from scenarios.scenario import Scenario
-from tests.builders import Fixed, as_run, replayed
+from tests.builders import Fixed, Scripted, as_run, replayed
 from tests.sumo.conftest import both
 
 
@@ -32,6 +32,7 @@ def hosted(scenario: Scenario) -> Scenario:
     return replace(scenario, profile=replace(AS_RUN, vehicle=vehicle))
 
 
+RELEASED = Accelerate(0, np.inf)
 AS_RUN_FOUR = hosted(four_way(profile="as_run"))
 
 
@@ -139,6 +140,23 @@ def test_advice_comes_before_and_after_insertion() -> None:
     ours, theirs = both(scenario, early, on_collision="record")
     assert ours.columns.travel_time[0] > 80.0 or not ours.columns.arrived[0]
     assert theirs.columns.travel_time == pytest.approx(ours.columns.travel_time, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    "script",
+    [
+        {10.0: (Brake(0, 3.0),), 12.0: (Brake(0, 0.0),)},
+        {10.0: (Accelerate(0, -1.0),), 14.0: (Accelerate(0, 1.0),), 16.0: (RELEASED,)},
+    ],
+    ids=["brake", "accelerate"],
+)
+def test_commands_do_the_same_out_of_sight(script: dict[float, tuple[Command, ...]]) -> None:
+    scenario = replayed(AS_RUN_FOUR, (0.0, 0, 2), horizon=80.0)
+    plan = Plan(period=1.0, sight=0.0, lanes_open=True)
+    controller = Scripted(lambda view: script.get(view.time, ()), plan)
+    ours, theirs = both(scenario, controller, record="junction")
+    assert theirs.columns.travel_time == pytest.approx(ours.columns.travel_time, abs=0.02)
+    assert ours.columns.travel_time[0] > 74.0, "73.3 without a command"
 
 
 def test_teleporting_is_sumos_default(tmp_path: Path) -> None:

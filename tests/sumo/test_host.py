@@ -34,6 +34,7 @@ from baselines import (
 )
 from dim import Dim, Mixed, NoisyPerception
 from minisim.control import (
+    Accelerate,
     Advise,
     Brake,
     Command,
@@ -169,9 +170,18 @@ def timed(
         {50.0: (Open(0),)},
         {0.0: (Go(0),), 20.0: (Brake(0, 6.0),), 30.0: (Brake(0, 0.0),)},
         {0.0: (Go(0),), 35.0: (Brake(0, 20.0),), 40.0: (Brake(0, 0.0),)},
+        {
+            0.0: (Go(0), Accelerate(0, 0.5)), 12.0: (Accelerate(0, -1.0),),
+            16.0: (Accelerate(0, 9.0), Advise(0, 12.0)), 34.0: (Accelerate(0, -2.0),),
+            36.0: (Accelerate(0, math.inf), Advise(0, math.inf)),
+        },
+        {10.0: (Accelerate(0, 1.0),), 60.0: (Go(0),)},
     ],
-    ids=["go", "advise", "stand", "revoke, hard braking", "open", "brake", "brake in the junction"],
-)
+    ids=[
+        "go", "advise", "stand", "revoke, hard braking", "open", "brake", "brake in the junction",
+        "accelerate", "accelerate, held",
+    ],
+)  # fmt: skip
 def test_commands_do_the_same(script: dict[float, tuple[Command, ...]]) -> None:
     ours, theirs = both(single(), timed(script), record="all")
     position, _ = furthest_apart(ours, theirs)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from minisim.carfollowing import STANDSTILL, braking_distance, cruise_control
-from minisim.engine.cruise.law import FASTEST, Cruise, allowed, follow, realise
+from minisim.engine.cruise.law import FASTEST, Cruise, allowed, follow, obey, realise
 from minisim.engine.cruise.radar import Ahead, gather, meet
 from minisim.engine.state import AMBER, DRIVING, Layout, Records
 from minisim.jit import njit_inner
@@ -49,8 +49,10 @@ def accelerate(vehicles: Records, lanes: Records, layout: Layout, law: Law, crui
                 u = free(me, layout, law, cruise)
             else:
                 u = cruise_control(v, v0, cruise.cruise_gain, cruise.a, cruise.b)
-            if me["told"] < math.inf:
-                u = told(me, u, law, cruise)
+            if me["told"] < math.inf and law.model == KRAUSS:
+                u = min(u, obey(me["told"], v, math.inf, law, cruise))
+            elif me["told"] < math.inf:
+                u = obey(me["told"], v, min(me["advice"], cruise.max_speed), law, cruise)
             if cruise.obeys:
                 u = min(u, (allowed(s, v, p, v0, layout, law, cruise) - v) / law.dt)
             nearest = own = tail = math.inf
@@ -130,18 +132,6 @@ def accelerate(vehicles: Records, lanes: Records, layout: Layout, law: Law, crui
                 a = max(min(a, hold(v, s, mine, law)), -mine.b_max)
             me["a"] = a
     return overlap
-
-
-@njit_inner
-def told(me: np.void, u: float, law: Law, cruise: Cruise) -> float:
-    """What a vehicle that nothing hinders asks for if a command sets its acceleration."""
-    v, asked = me["v"], me["told"]
-    if law.model == KRAUSS:
-        asked = min(asked, u)
-    else:
-        top = min(me["advice"], cruise.max_speed)
-        asked = min(asked, max((top - v) / law.dt, -cruise.b))
-    return float(asked if v > 0.0 else max(asked, 0.0))
 
 
 @njit_inner
