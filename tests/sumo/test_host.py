@@ -60,7 +60,7 @@ from scenarios.profiles import FAIR
 from scenarios.scenario import Scenario
 from scenarios.strategies import intersections
 from tests import ROOT
-from tests.builders import Fixed, Greens, Scripted, hardest_braking, queues, replayed, share
+from tests.builders import Fixed, Greens, Pedals, Scripted, hardest_braking, queues, replayed, share
 from tests.sumo.conftest import both
 from tests.unit.scenarios.cli.test_cli import Captured, answer, fails, ok
 
@@ -187,6 +187,40 @@ def test_commands_do_the_same(script: dict[float, tuple[Command, ...]]) -> None:
     position, _ = furthest_apart(ours, theirs)
     assert position < 0.1
     assert theirs.columns.travel_time == pytest.approx(ours.columns.travel_time, abs=0.2)
+
+
+#: Four vehicles in one lane are told to brake hard, to creep, to catch up, and to drive by the law.
+PLATOON: dict[float, tuple[Command, ...]] = {
+    0.0: (Open(0),),
+    12.0: (Accelerate(0, -3.0), Accelerate(2, 9.0)),
+    15.0: (Accelerate(0, 0.0), Accelerate(1, 0.5)),
+    20.0: (Accelerate(0, 2.0), Accelerate(3, -1.0)),
+    25.0: (Accelerate(0, math.inf), Accelerate(1, -9.0)),
+    28.0: (Accelerate(1, 9.0), Accelerate(3, 9.0)),
+    36.0: (Accelerate(2, -2.0),),
+    40.0: tuple(Accelerate(vehicle, math.inf) for vehicle in (1, 2, 3)),
+}
+
+
+@pytest.mark.parametrize(("model", "tolerance"), [("idm", 0.02), ("krauss", 0.5)])
+def test_a_platoon_obeys_alike(model: str, tolerance: float) -> None:
+    """To 2 cm, or half a metre where SUMO's own Krauss follows one that brakes hard."""
+    profile = replace(FAIR, vehicle=VehicleType(model=model))
+    trips = (0.0, 0, 2), (3.0, 0, 2), (6.0, 0, 1), (9.0, 0, 2)
+    scenario = replayed(four_way(100, profile=profile), *trips, horizon=120.0)
+    ours, theirs = both(scenario, timed(PLATOON), record="all")
+    assert max(furthest_apart(ours, theirs, k)[0] for k in range(4)) < tolerance
+    assert theirs.columns.travel_time == pytest.approx(ours.columns.travel_time, abs=0.1)
+    assert hardest_braking(theirs) == pytest.approx(profile.vehicle.max_deceleration)
+
+
+@pytest.mark.parametrize("model", ["IDM", "Krauss"])
+def test_no_sequence_of_accelerations_is_beyond_a_vehicle_or_makes_two_touch(model: str) -> None:
+    scenario = small_scenario(4, density=900.0, demand_time=20.0, drain=40.0)
+    run = simulate(scenario, Pedals(Dim(), 1), 1, model=model, record="all")
+    vehicle = run.site.vehicle
+    assert hardest_braking(run) <= vehicle.max_deceleration + 1e-6
+    assert run.trace["a"].max() == pytest.approx(vehicle.acceleration)
 
 
 @pytest.mark.parametrize(
