@@ -25,6 +25,7 @@ from minisim.control.commands import (
     Open,
     Reserve,
     Wake,
+    check_command,
 )
 from minisim.control.cover import NOTHING, ORDINARY, Cover, cover_of
 from minisim.control.plan import Marking, Plan
@@ -78,6 +79,7 @@ __all__ = [
     "Wake",
     "as_controller",
     "can_stop",
+    "check_command",
     "cover_of",
     "keeps",
     "stopping_distance",

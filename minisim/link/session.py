@@ -21,11 +21,12 @@ from minisim.control import (
     View,
     Wake,
     as_controller,
+    check_command,
     cover_of,
     keeps,
 )
 from minisim.errors import InputError, show
-from minisim.hosting import Alarm, check_command, listed
+from minisim.hosting import Alarm, listed
 from minisim.link.messages import Confirmed, Order, Status
 from minisim.link.office import Office
 from minisim.link.vehicles import Vehicles
