@@ -24,6 +24,7 @@ from scenarios.profiles import AS_RUN, FAIR
 from scenarios.scenario import Scenario
 from tests.builders import Fixed, Scripted, as_run, replayed
 from tests.sumo.conftest import both
+from tests.sumo.test_host import PLATOON, furthest_apart
 
 
 def hosted(scenario: Scenario) -> Scenario:
@@ -157,6 +158,16 @@ def test_commands_do_the_same_out_of_sight(script: dict[float, tuple[Command, ..
     ours, theirs = both(scenario, controller, record="junction")
     assert theirs.columns.travel_time == pytest.approx(ours.columns.travel_time, abs=0.02)
     assert ours.columns.travel_time[0] > 74.0, "73.3 without a command"
+
+
+def test_a_platoon_obeys_alike() -> None:
+    """To a millimetre: told to brake hard, to creep and to catch up, as in `test_host.py`."""
+    trips = tuple((3.0 * k, 0, 2) for k in range(4))
+    scenario = replayed(AS_RUN_FOUR, *trips, horizon=100.0)
+    controller = Scripted(lambda view: PLATOON.get(view.time, ()), Plan(period=1.0, sight=400.0))
+    ours, theirs = both(scenario, controller, record="all")
+    assert max(furthest_apart(ours, theirs, k)[0] for k in range(4)) < 0.001
+    assert ours.columns.arrived.all()
 
 
 def test_teleporting_is_sumos_default(tmp_path: Path) -> None:

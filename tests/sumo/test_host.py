@@ -202,6 +202,21 @@ PLATOON: dict[float, tuple[Command, ...]] = {
 }
 
 
+#: One crawls through the junction and on its exit; one behind is told to accelerate at any rate.
+CRAWL: dict[float, tuple[Command, ...]] = {
+    0.0: (Open(0), Accelerate(1, 9.0)), 25.0: (Advise(0, 2.0),),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("model", ["idm", "krauss"])
+def test_one_that_is_told_keeps_behind_one_that_has_left(model: str) -> None:
+    profile = replace(FAIR, vehicle=VehicleType(model=model))
+    scenario = replayed(four_way(100, profile=profile), (0.0, 0, 2), (4.0, 0, 2), horizon=140.0)
+    ours, theirs = both(scenario, timed(CRAWL), record="all")
+    assert max(furthest_apart(ours, theirs, k)[0] for k in range(2)) < 0.3
+    assert hardest_braking(theirs) < 6.0
+
+
 @pytest.mark.parametrize(("model", "tolerance"), [("idm", 0.02), ("krauss", 0.5)])
 def test_a_platoon_obeys_alike(model: str, tolerance: float) -> None:
     """To 2 cm, or half a metre where SUMO's own Krauss follows one that brakes hard."""

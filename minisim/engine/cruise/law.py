@@ -174,9 +174,9 @@ def allowed(
 
 
 @njit_inner
-def obey(told: float, v: float, top: float, law: Law, cruise: Cruise) -> float:
-    """What a vehicle asks for if a command sets its acceleration; above `top` it brakes at b."""
-    asked = min(told, max((top - v) / law.dt, -cruise.b))
+def obey(told: float, v: float, advice: float, law: Law, cruise: Cruise) -> float:
+    """What a vehicle asks of its engine if a command sets its acceleration."""
+    asked = min(told, (cruise.max_speed - v) / law.dt, max((advice - v) / law.dt, -cruise.b))
     return asked if v > 0.0 else max(asked, 0.0)
 
 

@@ -50,9 +50,9 @@ def accelerate(vehicles: Records, lanes: Records, layout: Layout, law: Law, crui
             else:
                 u = cruise_control(v, v0, cruise.cruise_gain, cruise.a, cruise.b)
             if me["told"] < math.inf and law.model == KRAUSS:
-                u = min(u, obey(me["told"], v, math.inf, law, cruise))
+                u = min(u, me["told"] if v > 0.0 else max(me["told"], 0.0))
             elif me["told"] < math.inf:
-                u = obey(me["told"], v, min(me["advice"], cruise.max_speed), law, cruise)
+                u = obey(me["told"], v, me["advice"], law, cruise)
             if cruise.obeys:
                 u = min(u, (allowed(s, v, p, v0, layout, law, cruise) - v) / law.dt)
             nearest = own = tail = math.inf
