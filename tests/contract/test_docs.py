@@ -85,3 +85,10 @@ def test_vehicles_glide_to_a_signal(
     example = blocks("docs/stepping.md")[2].replace("sim.view().vehicles", commanded)
     exec(compile(example, "docs/stepping.md", "exec"), {})
     assert float(capsys.readouterr().out) == pytest.approx(waited)
+
+
+def test_an_environment_is_used(capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("gymnasium", reason="needs the extra gym")
+    (example,) = blocks("docs/environments.md")
+    exec(compile(example, "docs/environments.md", "exec"), {})
+    assert int(capsys.readouterr().out) > 30
