@@ -169,7 +169,8 @@ class Follower(Steering):
         entry = self._law.entry
         self._enter(lanes)
         inside = {car.path for car in self._inside}
-        driven = any(car.told < math.inf for lane in lanes for car in lane)
+        told = any(car.told < math.inf for lane in lanes for car in lane)
+        wary = told or any(car.brake > 0.0 for lane in lanes for car in lane)
         for lane in lanes:
             foremost = True  # on the approach; it also follows vehicles from other lanes
             for k, car in enumerate(lane):
@@ -179,7 +180,9 @@ class Follower(Steering):
                 merges = alone and not held and (car.s >= entry or foremost)
                 foremost &= car.s >= entry
                 z = self._closeness(car, self._merging(car)) if merges else 0.0
-                ahead = [*self._leading(car, lane[:k]), *self._leaving(car)] if driven else []
+                ahead = [*self._leading(car, lane[:k])] if wary else []
+                if told:  # else no look at those that have left is recent
+                    ahead += self._leaving(car)
                 self._steer(car, lane[:k], held, z, ahead)
                 ignoring = held or crossed
                 if ignoring != car.ignoring:
@@ -207,7 +210,7 @@ class Follower(Steering):
     def _steer(
         self, car: Car, lane: Sequence[Car], held: bool, z: float, ahead: Sequence[Gap]
     ) -> None:
-        """Steer a car; `ahead` may brake harder than SUMO's laws expect, since one is told to."""
+        """Steer a car; it keeps room behind `ahead`, which commands may make brake hard."""
         law, me = self._law, car.traits
         v, s, section = car.v, car.s, car.section
         starts, speeds = self._limits[car.path]
