@@ -69,12 +69,22 @@ def test_its_mapping_is_one(tmp_path: Path) -> None:
 
 def test_a_search_looks_ahead(capsys: pytest.CaptureFixture[str]) -> None:
     """The examples in docs/stepping.md: DIM from outside, and a tree search."""
-    outside, _, search = blocks("docs/stepping.md")  # the other one: `tests/sumo/test_stepping.py`
+    outside, _, _, search = blocks("docs/stepping.md")  # the second: `tests/sumo/test_stepping.py`
     made: dict[str, Any] = {}
     exec(compile(outside, "docs/stepping.md", "exec"), made)
     assert digest(made["run"]) == digest(simulate(made["scenario"], Dim(), 1))
     exec(compile(search, "docs/stepping.md", "exec"), {})
     assert int(capsys.readouterr().out) > 0
+
+
+@pytest.mark.parametrize(("commanded", "waited"), [("sim.view().vehicles", 0.0), ("()", 8.4)])
+def test_vehicles_glide_to_a_signal(
+    commanded: str, waited: float, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The example in docs/stepping.md, and the same without its commands."""
+    example = blocks("docs/stepping.md")[2].replace("sim.view().vehicles", commanded)
+    exec(compile(example, "docs/stepping.md", "exec"), {})
+    assert float(capsys.readouterr().out) == pytest.approx(waited)
 
 
 def test_an_environment_is_used(capsys: pytest.CaptureFixture[str]) -> None:
