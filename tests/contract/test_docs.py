@@ -41,20 +41,20 @@ def test_a_page_imports_what_its_examples_use(page: str) -> None:
 
 
 def test_a_sheet_becomes_a_day(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The example in docs/counts.md, with a sheet of ten minutes."""
+    """The example in docs/howto/counts.md, with a sheet of ten minutes."""
     rows = [
         f"{time},{arm},{turn},2" for time in ("7:00", "7:05") for arm in "NESW" for turn in "LTR"
     ]
     (tmp_path / "sheet.csv").write_text("\n".join(["start,approach,turn,car", *rows]))
     monkeypatch.chdir(tmp_path)
-    (example,) = blocks("docs/counts.md")
-    exec(compile(example, "docs/counts.md", "exec"), {})
+    (example,) = blocks("docs/howto/counts.md")
+    exec(compile(example, "docs/howto/counts.md", "exec"), {})
     assert (tmp_path / "day.png").stat().st_size > 10_000
 
 
 def test_its_mapping_is_one(tmp_path: Path) -> None:
     """For a sheet with such columns, classes and turns."""
-    (mapping,) = blocks("docs/counts.md", kind="toml")
+    (mapping,) = blocks("docs/howto/counts.md", kind="toml")
     rows = [
         f"{time},{arm},{turn},9,1"
         for time in ("06:15", "06:30", "06:45") for arm in "ABCD" for turn in ("L", "GA", "R")
@@ -68,10 +68,10 @@ def test_its_mapping_is_one(tmp_path: Path) -> None:
 
 
 def test_a_search_looks_ahead(capsys: pytest.CaptureFixture[str]) -> None:
-    """The examples in docs/stepping.md: DIM from outside, and a tree search."""
-    outside, search = blocks("docs/stepping.md")
+    """The examples in docs/howto/stepping.md: DIM from outside, and a tree search."""
+    outside, search = blocks("docs/howto/stepping.md")
     made: dict[str, Any] = {}
-    exec(compile(outside, "docs/stepping.md", "exec"), made)
+    exec(compile(outside, "docs/howto/stepping.md", "exec"), made)
     assert digest(made["run"]) == digest(simulate(made["scenario"], Dim(), 1))
-    exec(compile(search, "docs/stepping.md", "exec"), {})
+    exec(compile(search, "docs/howto/stepping.md", "exec"), {})
     assert int(capsys.readouterr().out) > 0

@@ -1,4 +1,4 @@
-"""docs/fidelity.md cannot rot: its quick commands print what it quotes, the others are valid."""
+"""docs/background/fidelity.md cannot rot: its quick commands print what it quotes, the others are valid."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from scenarios.library import scenario_named
 from scenarios.profiles import profile_named
 from tests import ROOT
 
-PAGE = (ROOT / "docs" / "fidelity.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "background" / "fidelity.md").read_text(encoding="utf-8")
 
 
 def blocks(kind: str) -> list[str]:
