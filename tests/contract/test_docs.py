@@ -51,7 +51,9 @@ def commands(page: str) -> list[str]:
     return re.findall(r"^(?:\$ )?((?:minisim|python) .*?)(?: +#.*)?$", text, re.MULTILINE)
 
 
-@pytest.mark.parametrize("page", [it for it in PAGES if it != "CONTRIBUTING.md" and blocks(it, "python")])
+@pytest.mark.parametrize(
+    "page", [it for it in PAGES if it != "CONTRIBUTING.md" and blocks(it, "python")]
+)
 def test_a_page_imports_what_its_examples_use(page: str) -> None:
     """Read from the top: an example may use what one before it made."""
     nodes = list(ast.walk(ast.parse("\n".join(blocks(page, "python")))))
