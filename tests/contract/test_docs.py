@@ -33,6 +33,7 @@ PAGES = {
     for path in [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").rglob("*.md")]
     if "generated" not in path.parts
 }
+READ = [page for page in PAGES if page != "CONTRIBUTING.md"]  # whose examples are for users
 HOWTO = sorted(page for page in PAGES if page.startswith("docs/howto/"))
 #: Those whose examples have tests of their own below or need a long run before, and slow ones.
 OWN = {f"docs/howto/{name}.md" for name in ("counts", "stepping", "benchmark")}
@@ -76,7 +77,7 @@ def test_a_page_imports_what_its_examples_use(page: str) -> None:
 def test_the_examples_of_a_how_to_run(
     page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """In their order, in an empty folder; an example that begins with a file's name is that file."""
+    """In their order, in an empty folder; one that begins with a file's name is that file."""
     if page.endswith("sumo.md"):
         pytest.importorskip("libsumo", reason="needs the extra sumo")
     from matplotlib import pyplot as plt
