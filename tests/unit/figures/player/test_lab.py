@@ -37,7 +37,7 @@ def lab() -> Iterator[Lab]:
 def ask(
     lab: Lab, path: str, *, token: str | None = None, host: str | None = None, method: str = "GET"
 ) -> tuple[int, Any, bytes]:
-    connection = http.client.HTTPConnection(HOST, lab.server_port, timeout=30)
+    connection = http.client.HTTPConnection(HOST, lab.server_port, timeout=300)
     connection.putrequest(method, f"/{lab.token if token is None else token}{path}", skip_host=True)
     connection.putheader("Host", f"{HOST}:{lab.server_port}" if host is None else host)
     connection.endheaders()
