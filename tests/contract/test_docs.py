@@ -177,8 +177,11 @@ def test_its_mapping_is_one(tmp_path: Path) -> None:
 
 
 def test_a_search_looks_ahead(capsys: pytest.CaptureFixture[str]) -> None:
-    """The examples in docs/howto/stepping.md: DIM from outside, and a tree search."""
-    outside, _, search = blocks("docs/howto/stepping.md", "python")  # _: `tests/sumo/test_stepping.py`
+    """The examples in docs/howto/stepping.md: DIM from outside, and a tree search.
+
+    `tests/sumo/test_stepping.py` runs the one between them.
+    """
+    outside, _, search = blocks("docs/howto/stepping.md", "python")
     made: dict[str, Any] = {}
     exec(compile(outside, "docs/howto/stepping.md", "exec"), made)
     assert digest(made["run"]) == digest(simulate(made["scenario"], Dim(), 1))
