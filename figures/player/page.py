@@ -13,8 +13,8 @@ from minisim.errors import InputError
 from minisim.files import AnyPath, write_text
 from minisim.results.run import Run
 
-#: Height of a player in a notebook [px].
-HEIGHT = 580
+#: Height of a player of one run in a notebook, and of one of two [px].
+HEIGHTS = (580, 880)
 
 
 class Player:
@@ -48,7 +48,7 @@ class Player:
     def _repr_html_(self) -> str:
         """A frame of its own, which shares no style, key or script with the notebook."""
         held = self.page("").replace("&", "&amp;").replace("'", "&#39;")
-        style = f"width: 100%; height: {HEIGHT}px; border: 0"
+        style = f"width: 100%; height: {HEIGHTS[len(self.scenes) - 1]}px; border: 0"
         return f"<iframe sandbox='allow-scripts' style='{style}' srcdoc='{held}'></iframe>"
 
 

@@ -883,8 +883,10 @@ class Player extends HTMLElement {
   /** Make the pictures as large as the place allows, with the controls in view. */
   fit() {
     if (!this.panes.length || !this.clientWidth) return;
-    const narrow = this.clientWidth < 760, runs = this.panes.length;
+    const runs = this.panes.length, narrow = this.clientWidth < (runs > 1 ? 1000 : 760);
+    const abreast = narrow && this.clientWidth >= 620 ? runs : 1;
     this.board.classList.toggle("narrow", narrow);
+    this.board.classList.toggle("abreast", abreast > 1);
     const full = this.hasAttribute("fill") ? this.clientHeight : Math.min(0.85 * window.innerHeight, 720);
     const panel = runs > 1 ? Math.max(345, 0.275 * this.clientWidth) : 330;
     let side = 0, captions = [];
@@ -892,7 +894,8 @@ class Player extends HTMLElement {
       captions = this.panes.map((it) => it.figure.firstChild.offsetHeight);
       const room = full - this.controls.offsetHeight - 26;
       side = Math.max(150, Math.floor(narrow
-        ? Math.min(this.clientWidth - 16, (room - captions.reduce((a, b) => a + b, 0) - 6 * runs) / runs)
+        ? Math.min((this.clientWidth - 8) / abreast - 8, abreast > 1 ? room - Math.max(...captions)
+          : (room - captions.reduce((a, b) => a + b, 0) - 6 * runs) / runs)
         : Math.min((this.clientWidth - panel - 10 * runs) / runs, room - Math.max(...captions))));
       this.style.setProperty("--side", `${side}px`);
     }

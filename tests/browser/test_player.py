@@ -14,7 +14,7 @@ import minisim
 from baselines import FixedTime
 from dim import Dim
 from figures import Player, play
-from figures.player.page import HEIGHT, script
+from figures.player.page import HEIGHTS, script
 from figures.player.scene import dumped, scene
 from minisim.control import Unregulated
 from minisim.results.run import Run
@@ -325,17 +325,18 @@ def test_two_players_on_one_page(browser: Browser, runs: list[Run], tmp_path: Pa
 @pytest.mark.slow
 def test_two_players_in_one_notebook(browser: Browser, runs: list[Run], tmp_path: Path) -> None:
     """As a saved notebook holds them: what one does, the other does not."""
+    height = HEIGHTS[0]
     shows = "".join(play(it, start=START, seconds=SECONDS)._repr_html_() for it in runs)
     file = tmp_path / "notebook.html"
     file.write_text(f'<!doctype html><link rel="icon" href="data:,">{shows}', encoding="utf-8")
     shown = browser.page()
-    shown.size(1000, 2 * HEIGHT + 40)
+    shown.size(1000, 2 * height + 40)
     shown.open(file.as_uri())
 
     def looks() -> list[Image.Image]:
         shown.picture(tmp_path / "seen.png")
         seen = Image.open(tmp_path / "seen.png")
-        return [seen.crop((20, y + 70, 400, y + 400)) for y in (8, 8 + HEIGHT)]  # the junctions
+        return [seen.crop((20, y + 70, 400, y + 400)) for y in (8, 8 + height)]  # the junctions
 
     def until(changed: tuple[bool, bool]) -> list[Image.Image]:
         for _ in range(100):
@@ -346,12 +347,12 @@ def test_two_players_in_one_notebook(browser: Browser, runs: list[Run], tmp_path
 
     shown.run("new Promise((done) => setTimeout(done, 500))")
     before = looks()
-    shown.click(45, HEIGHT - 30)  # the first one's play button
+    shown.click(45, height - 30)  # the first one's play button
     before = until((True, False))
     shown.press(" ")
     before = looks()
     assert looks() == before, "Space stops the one that was clicked"
-    shown.click(45, 2 * HEIGHT - 30)
+    shown.click(45, 2 * height - 30)
     until((False, True))
     at_rest(shown, file)
 

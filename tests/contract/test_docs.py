@@ -38,7 +38,9 @@ HOWTO = sorted(page for page in PAGES if page.startswith("docs/howto/"))
 #: Those whose examples have tests of their own below or need a long run before, and slow ones.
 OWN = {f"docs/howto/{name}.md" for name in ("counts", "stepping", "benchmark")}
 SLOW = {"docs/howto/messages.md", "docs/howto/property-tests.md", "docs/howto/sumo.md"}
-#: What a command or a page may name without having it: a reader's own files.
+#: What an example may import -> what that needs, which may not be installed.
+NEEDS = {"minisim.sumo": "libsumo", "figures.notebook": "anywidget"}
+#: What a command may name without having it: a reader's own files.
 OWN_FILE = re.compile(r"^(?!.*/).*(?:mine|\.(?:xml|toml|csv|osm))$")
 
 
@@ -52,9 +54,7 @@ def commands(page: str) -> list[str]:
     return re.findall(r"^(?:\$ )?((?:minisim|python) .*?)(?: +#.*)?$", text, re.MULTILINE)
 
 
-@pytest.mark.parametrize(
-    "page", [it for it in PAGES if it != "CONTRIBUTING.md" and blocks(it, "python")]
-)
+@pytest.mark.parametrize("page", [page for page in READ if blocks(page, "python")])
 def test_a_page_imports_what_its_examples_use(page: str) -> None:
     """Read from the top: an example may use what one before it made."""
     nodes = list(ast.walk(ast.parse("\n".join(blocks(page, "python")))))
@@ -78,8 +78,6 @@ def test_the_examples_of_a_how_to_run(
     page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """In their order, in an empty folder; one that begins with a file's name is that file."""
-    if page.endswith("sumo.md"):
-        pytest.importorskip("libsumo", reason="needs the extra sumo")
     from matplotlib import pyplot as plt
 
     mpl.use("Agg")
@@ -91,7 +89,11 @@ def test_the_examples_of_a_how_to_run(
         for example in blocks(page, "python", "toml"):
             if named := FILE.match(example):
                 (tmp_path / named[1]).write_text(example, encoding="utf-8")
-            elif example in blocks(page, "python"):
+                continue
+            for needing, module in NEEDS.items():
+                if needing in example:
+                    pytest.importorskip(module, reason=f"needs {module}")
+            if example in blocks(page, "python"):
                 exec(compile(example, page, "exec"), made)
     finally:
         plt.close("all")
