@@ -39,7 +39,9 @@ HOWTO = sorted(page for page in PAGES if page.startswith("docs/howto/"))
 OWN = {f"docs/howto/{name}.md" for name in ("counts", "stepping", "benchmark")}
 SLOW = {"docs/howto/messages.md", "docs/howto/property-tests.md", "docs/howto/sumo.md"}
 #: What an example may import -> what that needs, which may not be installed.
-NEEDS = {"minisim.sumo": "libsumo", "figures.notebook": "anywidget"}
+NEEDS = {
+    "minisim.sumo": "libsumo", "figures.notebook": "anywidget", "gymnasium": "gymnasium",
+}  # fmt: skip
 #: What a command may name without having it: a reader's own files.
 OWN_FILE = re.compile(r"^(?!.*/).*(?:mine|\.(?:xml|toml|csv|osm))$")
 
