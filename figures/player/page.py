@@ -13,6 +13,8 @@ from minisim.errors import InputError
 from minisim.files import AnyPath, write_text
 from minisim.results.run import Run
 
+#: The player's script, in this order.
+SCRIPTS = ("scene.js", "drawing.js", "pane.js", "player.js")
 #: Height of a player of one run in a notebook, and of one of two [px].
 HEIGHTS = (580, 880)
 
@@ -71,7 +73,7 @@ def script() -> str:
     colours = "".join(f"--{name}: {colour}; " for name, colour in look().items())
     sheet = f":host {{ {colours}}}\n{_file('player.css')}"
     quoted = json.dumps(sheet).replace("<", r"\u003c")
-    return f"const STYLE = {quoted};\n{_file('player.js')}"
+    return "\n".join([f"const STYLE = {quoted};", *map(_file, SCRIPTS)])
 
 
 def different_arrivals(one: Scene, other: Scene) -> str:
