@@ -13,6 +13,7 @@ import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from random import Random
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -25,6 +26,7 @@ from dim import Dim, NoisyPerception
 from dim.perception import See
 from minisim.arrivals import Arrivals
 from minisim.control import (
+    Accelerate,
     Close,
     Command,
     Controller,
@@ -178,6 +180,34 @@ class EveryStep:
         session = self.controller.start(site)
         plan = dataclasses.replace(session.plan, period=site.dt)
         return ScriptedSession(plan, session.decide)
+
+
+#: What `Pedals` asks for [m/s²]; infinity leaves a vehicle to its law.
+PEDALS = (math.inf, math.inf, -1000.0, -9.0, -3.0, -1.0, 0.0, 0.5, 2.0, 1000.0)
+
+
+@dataclass(frozen=True)
+class Pedals:
+    """A controller that also sets random accelerations, of all vehicles up to the exit."""
+
+    controller: Controller
+    seed: int = 0
+    often: float = 0.2
+    name: str = "pedals"
+
+    def start(self, site: Site) -> Session:
+        session, chance = self.controller.start(site), Random(self.seed)
+        plan = session.plan
+
+        def decide(view: View) -> Iterable[Command]:
+            near = tuple(it for it in view.vehicles if it.distance <= plan.sight)
+            yield from session.decide(view._replace(vehicles=near))
+            for vehicle in view.vehicles:
+                if chance.random() < self.often:
+                    yield Accelerate(vehicle.id, chance.choice(PEDALS))
+
+        sight = site.intersection.approach_length
+        return ScriptedSession(dataclasses.replace(plan, period=0.5, sight=sight), decide)
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,21 @@ carries out the commands that the session returns. Only a plan with a period wak
 
 from __future__ import annotations
 
-from minisim.control.commands import Advise, Brake, Close, Command, Go, Hold, Open, Reserve, Wake
+from minisim.control.commands import (
+    TO_LANES,
+    TO_VEHICLES,
+    Accelerate,
+    Advise,
+    Brake,
+    Close,
+    Command,
+    Go,
+    Hold,
+    Open,
+    Reserve,
+    Wake,
+    check_command,
+)
 from minisim.control.cover import NOTHING, ORDINARY, Cover, cover_of
 from minisim.control.plan import Marking, Plan
 from minisim.control.protocols import Controller, Counting, Kinds, Session, as_controller, keeps
@@ -37,6 +51,9 @@ __all__ = [
     "NOTHING",
     "NO_REPORTS",
     "ORDINARY",
+    "TO_LANES",
+    "TO_VEHICLES",
+    "Accelerate",
     "Advise",
     "Brake",
     "Close",
@@ -62,6 +79,7 @@ __all__ = [
     "Wake",
     "as_controller",
     "can_stop",
+    "check_command",
     "cover_of",
     "keeps",
     "stopping_distance",

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from minisim.control import (
+    Accelerate,
     Advise,
     Brake,
     Command,
@@ -146,6 +147,8 @@ class Office:
                 self._change(file, speed=speed)
             case Brake(vehicle, braking) if braking != file.order.braking:
                 self._change(file, braking=braking)
+            case Accelerate(vehicle, asked) if asked != file.order.acceleration:
+                self._change(file, acceleration=asked)
 
     def _change(self, file: File, **what: Any) -> None:
         file.order = file.order._replace(number=file.order.number + 1, **what)

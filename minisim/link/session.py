@@ -8,14 +8,11 @@ from typing import Any
 
 from minisim.channel import Air, Chances, Channel, steps
 from minisim.control import (
-    Advise,
-    Brake,
+    TO_VEHICLES,
     Command,
     Controller,
     Counting,
     Cover,
-    Go,
-    Hold,
     Plan,
     Radio,
     Reserve,
@@ -24,11 +21,12 @@ from minisim.control import (
     View,
     Wake,
     as_controller,
+    check_command,
     cover_of,
     keeps,
 )
 from minisim.errors import InputError, show
-from minisim.hosting import Alarm, check_command, listed
+from minisim.hosting import Alarm, listed
 from minisim.link.messages import Confirmed, Order, Status
 from minisim.link.office import Office
 from minisim.link.vehicles import Vehicles
@@ -177,7 +175,7 @@ class Link:
                 self._alarm.set(command)
             elif isinstance(command, Reserve):
                 self._down.send(now, command)
-            elif isinstance(command, Go | Hold | Advise | Brake):
+            elif isinstance(command, TO_VEHICLES):
                 self._office.take(command)
             else:
                 yield command

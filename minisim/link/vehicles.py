@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from minisim.control import (
+    Accelerate,
     Advise,
     Brake,
     Command,
@@ -113,6 +114,8 @@ class Vehicles:
             yield Advise(new.vehicle, new.speed)
         if new.braking != old.braking:
             yield Brake(new.vehicle, new.braking)
+        if new.acceleration != old.acceleration:
+            yield Accelerate(new.vehicle, new.acceleration)
 
     def _stops(self, me: Observed) -> bool:
         return can_stop(me, self._brakes[me.type])

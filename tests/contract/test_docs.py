@@ -183,11 +183,23 @@ def test_its_mapping_is_one(tmp_path: Path) -> None:
 def test_a_search_looks_ahead(capsys: pytest.CaptureFixture[str]) -> None:
     """The examples in docs/howto/stepping.md: DIM from outside, and a tree search.
 
-    `tests/sumo/test_stepping.py` runs the one between them.
+    `tests/sumo/test_stepping.py` runs the second.
     """
-    outside, _, search = blocks("docs/howto/stepping.md", "python")
+    outside, _, _, search = blocks("docs/howto/stepping.md", "python")
     made: dict[str, Any] = {}
     exec(compile(outside, "docs/howto/stepping.md", "exec"), made)
     assert digest(made["run"]) == digest(simulate(made["scenario"], Dim(), 1))
     exec(compile(search, "docs/howto/stepping.md", "exec"), {})
     assert int(capsys.readouterr().out) > 0
+
+
+@pytest.mark.parametrize(("commanded", "waited"), [("sim.view().vehicles", 0.0), ("()", 8.4)])
+def test_vehicles_glide_to_a_signal(
+    commanded: str, waited: float, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The example in docs/howto/stepping.md, and the same without its commands."""
+    example = blocks("docs/howto/stepping.md", "python")[2].replace(
+        "sim.view().vehicles", commanded
+    )
+    exec(compile(example, "docs/howto/stepping.md", "exec"), {})
+    assert float(capsys.readouterr().out) == pytest.approx(waited)

@@ -2,12 +2,24 @@
 
 from __future__ import annotations
 
+import math
 import re
 from pathlib import Path
 
 import pytest
 
-from minisim.control import Advise, Close, Go, Hold, Observed, Open, Plan, Unregulated, View
+from minisim.control import (
+    Accelerate,
+    Advise,
+    Close,
+    Go,
+    Hold,
+    Observed,
+    Open,
+    Plan,
+    Unregulated,
+    View,
+)
 from minisim.reasons import KINDS, Reason, Shown, Witness
 from scenarios import four_way
 from tests.builders import ROOT, car, view
@@ -95,6 +107,11 @@ def test_commands_tell_which_vehicles_hold_the_right_of_way() -> None:
     inside = car(0, "a2", -3.0)
     it.look(view(inside, b, behind, time=3.0))
     assert kinds(it) == [(0, "crossing", ()), (1, "advised", ()), (2, "behind", (1,))]
+    it.told.clear()
+    it.note([Advise(1, math.inf), Accelerate(1, -1.0)])
+    it.look(view(inside, b, behind, time=3.5))
+    assert kinds(it) == [(1, "told", ())]
+    assert it.told[0].reason.sentence == "Vehicle 1 is told to accelerate at -1.0 m/s²."
     it.told.clear()
     it.look(view(behind, time=4.0))
     assert kinds(it) == [(2, "held", ()), (0, "left", ()), (1, "left", ())]

@@ -38,6 +38,14 @@ def test_a_vehicle_does_what_the_newest_order_says() -> None:
     assert status == Status(car(0, "a2", 40.0, 5.0), 7, number=4, holds=False, left=False)
 
 
+def test_an_acceleration_is_told_and_released_by_messages() -> None:
+    vehicles = beside(car(0, "a2", 40.0, 5.0))
+    told = Order(0, 1, acceleration=-1.0)
+    assert obeyed(vehicles, told) == ["Accelerate 0"]
+    assert obeyed(vehicles, told._replace(number=2)) == []
+    assert obeyed(vehicles, Order(0, 3)) == ["Accelerate 0"]
+
+
 def test_one_that_cannot_stop_keeps_its_right_of_way_and_says_so() -> None:
     vehicles = beside(car(0, "a2", 5.0, 13.0))
     assert obeyed(vehicles, Order(0, 1, go=True), Order(0, 2)) == ["Go 0"]
