@@ -86,7 +86,7 @@ def _report(result: Result, facts: str, drawn: Iterable[str]) -> Iterator[str]:
     yield (
         "All controllers have the same arrivals. A run goes on until its last vehicle has arrived, "
         "and every vehicle counts. The least delay is a bound that no controller can beat "
-        "(docs/optimum.md); the schedule knows all arrivals beforehand. "
+        "(docs/howto/optimum.md); the schedule knows all arrivals beforehand. "
         f"`{FILE}` has every row: compare it with another one by `minisim benchmark --compare`."
     )
     for cell, why in head["no_least"].items():

@@ -189,17 +189,17 @@ def _above(run: Run) -> float | None:
 DELAY = Metric(
     "delay_s", delays, "s", "trip", "run and trips", title="delay",
     meaning="against driving on at the limits of the roads, whatever zones a controller has",
-    equation="arrival − demand − way/limits (ours; docs/optimum.md)",
+    equation="arrival − demand − way/limits (ours; docs/howto/optimum.md)",
 )  # fmt: skip
 LEAST = Metric(
     "least_delay_s", _least_delay, "s", title="least delay",
     meaning="no controller has a mean delay below it; none if it is not known",
-    equation="best order by dynamic programming (ours; docs/optimum.md)",
+    equation="best order by dynamic programming (ours; docs/howto/optimum.md)",
 )  # fmt: skip
 ABOVE = Metric(
     "above_least_percent", _above, "%", title="above the least delay",
     meaning="mean delay against the least possible; none if a vehicle has not arrived",
-    equation="100·(delay − least)/least (ours; docs/optimum.md)",
+    equation="100·(delay − least)/least (ours; docs/howto/optimum.md)",
 )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-// The player of scenes, as one custom element; docs/scene.md tells what a scene holds.
+// The player of scenes, as one custom element; docs/reference/scene.md tells what a scene holds.
 //
 //   element.show([scene, …])   one or two scenes on one clock, side by side
 //   element.time               the time that is shown [s]; may be set

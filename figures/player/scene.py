@@ -1,6 +1,6 @@
 """A run as a scene: everything that a player shows of it, as plain data for JSON.
 
-docs/scene.md tells the format. Times are whole steps of the scene after its start.
+docs/reference/scene.md tells the format. Times are whole steps of the scene after its start.
 """
 
 from __future__ import annotations
@@ -159,7 +159,7 @@ def _tracks(run: Run, clock: _Clock) -> tuple[list[dict[str, Any]], set[tuple[in
     clear = np.array([it.exit for it in site.intersection.paths])[path]
     clear += np.array([it.length for it in site.types])[kind]
     goes &= s <= clear
-    state = 2 * goes + (v <= HALTING)  # see docs/scene.md
+    state = 2 * goes + (v <= HALTING)  # see docs/reference/scene.md
     new = (np.diff(vehicle, prepend=-1) != 0) | (np.diff(step, prepend=-1) != 1)
     starts = np.flatnonzero(new)
     centimetres = np.round(100.0 * s).astype(np.int64)

@@ -17,7 +17,7 @@ from scenarios.cli.shared.terminal import bar
     epilog="CMA-ES on the weights of a linear policy for four arms: which of the vehicles that "
     "wait go first, as far as that is safe. Writes DIR/learnt.json (weights, and what each "
     "generation cost), DIR/learnt.csv (the runs of the comparison) and DIR/learnt.png. Needs the "
-    "extra gym. See docs/learning.md.\n\n"
+    "extra gym. See docs/howto/learning.md.\n\n"
     "minisim train --generations 20 --out try"
 )
 def train(

@@ -66,7 +66,7 @@ def test_ways_that_are_not_netconverts_are_refused() -> None:
 
 
 #: Share of the trips whose waiting and travel times are both within 0.1 s in the two hosts, at
-#: least. The issue asks for 0.9; five arms part late in the hour (docs/fidelity.md).
+#: least. The issue asks for 0.9; five arms part late in the hour (docs/background/fidelity.md).
 SHARES = [
     (Cell("balanced", 150, 3), 3600.0, 1.0),
     (Cell("balanced", 350, 3), 3600.0, 0.99),

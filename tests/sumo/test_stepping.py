@@ -276,6 +276,6 @@ def test_a_session_that_fails_is_told_as_elsewhere() -> None:
 @linux
 def test_the_example_in_the_docs_runs(capsys: pytest.CaptureFixture[str]) -> None:
     made: dict[str, object] = {}
-    for block in blocks("docs/stepping.md")[:2]:
-        exec(compile(block, "docs/stepping.md", "exec"), made)
+    for block in blocks("docs/howto/stepping.md", "python")[:2]:
+        exec(compile(block, "docs/howto/stepping.md", "exec"), made)
     assert int(capsys.readouterr().out) > 0

@@ -44,7 +44,7 @@ def kinds(it: Witness) -> list[tuple[int, str, tuple[int, ...]]]:
 
 
 def example(kind: str) -> Reason:
-    """Of vehicle 7, as `docs/reasons.md` shows it."""
+    """Of vehicle 7, as `docs/howto/reasons.md` shows it."""
     return Reason(kind, 7, (3, 5), ("a1", "c1"), 12.0, 20.0, "…")
 
 
@@ -148,7 +148,7 @@ def test_heads_are_written_down_when_they_change_and_tell_since_when() -> None:
 
 
 def test_the_page_has_all_kinds() -> None:
-    page = Path(ROOT / "docs" / "reasons.md").read_text()
+    page = Path(ROOT / "docs" / "howto" / "reasons.md").read_text()
     rows = re.findall(r"^\| ([a-z ]+) \| (.+) \|$", page, re.MULTILINE)
     table = {kind: said for kind, said in rows if kind != "kind"}
     assert table == {kind: example(kind).sentence for kind in KINDS}
