@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from functools import lru_cache
 from itertools import product
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -119,6 +120,7 @@ def losses(rows: pd.DataFrame) -> dict[tuple[str, str, str], Crossing]:
     return known
 
 
+@lru_cache(maxsize=2)
 def needed_losses(results: Results) -> dict[tuple[str, str, str], Crossing]:
     """The `losses`; raises `MissingRunsError` if no pair has two demands in common."""
     known = {} if results.good.empty else losses(results.good)

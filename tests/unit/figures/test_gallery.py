@@ -7,6 +7,7 @@ import io
 import re
 import sys
 from collections.abc import Callable, Iterator
+from functools import cache
 from itertools import chain, combinations
 from pathlib import Path
 from types import ModuleType
@@ -76,6 +77,7 @@ def having(wanted: Callable[[Recipe], bool], effort: Effort = EFFORT, **columns:
 PARTIAL, EMPTY = having(lambda e: e.label != "adaptive"), having(lambda _: False)
 
 
+@cache
 def drawn(name: str, archive: Archive) -> Any:
     return GALLERY[name].build(archive)
 
@@ -86,7 +88,7 @@ def texts_of(figure: Figure) -> list[str]:
 
 @pytest.mark.parametrize("name", GALLERY)
 def test_everything_can_be_made_and_nothing_is_cut_off(name: str, archive: Archive) -> None:
-    drawing = GALLERY[name].build(archive)
+    drawing = drawn(name, archive)
     if isinstance(drawing, Table):
         assert drawing.rows
         return
