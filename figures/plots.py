@@ -137,7 +137,9 @@ def draw_published(
         drawn: dict[str, Any] = {
             "color": look.colour, "markeredgewidth": 1.2, "linestyle": "none", "zorder": 5
         }  # fmt: skip
-        axes.plot(x, chosen["paper"], look.marker, markersize=8.0, markerfacecolor="none", **drawn)
+        axes.plot(
+            x, chosen["paper"], marker=look.marker, markersize=8.0, markerfacecolor="none", **drawn
+        )
         crossed = (chosen["comparable"] != "yes").to_numpy()
         axes.plot(x[crossed], chosen["paper"][crossed], "x", markersize=7.0, **drawn)
 

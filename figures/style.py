@@ -77,7 +77,7 @@ FORMATS = ("png", "pdf", "svg")
 def look(series: str) -> Look:
     """The look of a series, as `coloured` gives it; grey for an unknown one."""
     known = VARIANTS[series].look if series in VARIANTS else SERIES.get(series)
-    return coloured(known or Look(series, "grey", "8", ":"))
+    return coloured(known or Look(series, "grey", "$?$", ":"))
 
 
 def coloured(look: Look) -> Look:

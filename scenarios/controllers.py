@@ -37,7 +37,7 @@ class Look(NamedTuple):
 
     label: str
     colour: str  # its name in `figures.style.COLOURS`
-    marker: str
+    marker: str | tuple[int, int, float]  # in matplotlib's words
     dashes: Literal["-", "--", "-.", ":"]
 
 
@@ -82,8 +82,9 @@ CONTROLLERS: Mapping[str, Entry] = MappingProxyType({
             Variant("gate=harmonious", Look("DIM, harmonious gate", "sky", "p", "-"), rival=True),
             Variant("gate=passed", Look("DIM, gate passed", "indigo", ">", "--"), rival=True),
             Variant("order=lanes", Look("DIM, lanes first", "green", "3", "--")),
-            Variant("priorities=rotating", Look("DIM, rotating priority", "orange", "+", "-.")),
-            Variant("priorities=waiting", Look("DIM, longest-waiting priority", "green", "*", ":")),
+            Variant("priorities=rotating", Look("DIM, rotating priority", "orange", "8", "-.")),
+            Variant("priorities=waiting",
+                    Look("DIM, longest-waiting priority", "green", (3, 1, 0.0), ":")),
             Variant("order=lanes,priorities=waiting",
                     Look("DIM, lanes first by waiting", "indigo", "4", "-.")),
             Variant("monitor=on", Look("DIM with safety monitor", "blue", "H", "-.")),
@@ -109,8 +110,9 @@ CONTROLLERS: Mapping[str, Entry] = MappingProxyType({
             Variant("batch=1", Look("slots, first come first served", "ink", "x", ":"), rival=True),
         )),
         Entry("platoons", "baselines:Platoons", RADIO, (
-            Variant("", Look("platoons, exhaustive", "indigo", "1", "-"), rival=True),
-            Variant("service=gated", Look("platoons, gated", "indigo", "2", ":"), rival=True),
+            Variant("", Look("platoons, exhaustive", "indigo", "*", "-"), rival=True),
+            Variant("service=gated",
+                    Look("platoons, gated", "indigo", (4, 1, 0.0), ":"), rival=True),
         )),
         Entry("actuated", "baselines:Actuated", SIGNALS,
               _plain("actuated signal", "brown", "$a$", ":", rival=False)),

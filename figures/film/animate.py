@@ -220,7 +220,7 @@ class Picture:
     def _vehicle_keys(self) -> list[Key]:
         keys: list[Key] = [
             (style.RIGHT_OF_WAY, "has the right of way", "body"),
-            (style.WAITING, "stands", "body"), (style.FREE, "moves", "body"),
+            (style.WAITING, "in a queue", "body"), (style.FREE, "moves", "body"),
         ]  # fmt: skip
         if self._film.human.any():
             keys.append((style.INK, "outline: human", "body"))
@@ -304,7 +304,7 @@ class Picture:
         film = self._film
         clock = f"{int(time) // 60:02d}:{int(time) % 60:02d}"
         seen = film.rows(film.at(time), self._reach)
-        counts = f"standing {film.waiting(seen)}   served {film.served(time)}"
+        counts = f"in queues {film.waiting(seen)}   served {film.served(time)}"
         if self.run.collisions:
             counts = f"collisions {film.collided(time)}   {counts}"
         before = self._clock.get_text() + self._counts.get_text()
