@@ -37,7 +37,7 @@ class Look(NamedTuple):
 
     label: str
     colour: str  # its name in `figures.style.COLOURS`
-    marker: str | tuple[int, int, float]  # in matplotlib's words
+    marker: str | tuple[int, Literal[1], int]  # as in matplotlib: a character, or a star
     dashes: Literal["-", "--", "-.", ":"]
 
 
@@ -81,12 +81,12 @@ CONTROLLERS: Mapping[str, Entry] = MappingProxyType({
             Variant("", Look("DIM", "blue", "o", "-"), rival=True),
             Variant("gate=harmonious", Look("DIM, harmonious gate", "sky", "p", "-"), rival=True),
             Variant("gate=passed", Look("DIM, gate passed", "indigo", ">", "--"), rival=True),
-            Variant("order=lanes", Look("DIM, lanes first", "green", "3", "--")),
+            Variant("order=lanes", Look("DIM, lanes first", "green", (3, 1, 180), "--")),
             Variant("priorities=rotating", Look("DIM, rotating priority", "orange", "8", "-.")),
             Variant("priorities=waiting",
-                    Look("DIM, longest-waiting priority", "green", (3, 1, 0.0), ":")),
+                    Look("DIM, longest-waiting priority", "green", (3, 1, 0), ":")),
             Variant("order=lanes,priorities=waiting",
-                    Look("DIM, lanes first by waiting", "indigo", "4", "-.")),
+                    Look("DIM, lanes first by waiting", "indigo", (4, 1, 45), "-.")),
             Variant("monitor=on", Look("DIM with safety monitor", "blue", "H", "-.")),
         ), as_run="dim-as-run"),
         Entry("fixed-time", "baselines:FixedTime", SIGNALS, (
@@ -112,7 +112,7 @@ CONTROLLERS: Mapping[str, Entry] = MappingProxyType({
         Entry("platoons", "baselines:Platoons", RADIO, (
             Variant("", Look("platoons, exhaustive", "indigo", "*", "-"), rival=True),
             Variant("service=gated",
-                    Look("platoons, gated", "indigo", (4, 1, 0.0), ":"), rival=True),
+                    Look("platoons, gated", "indigo", (4, 1, 0), ":"), rival=True),
         )),
         Entry("actuated", "baselines:Actuated", SIGNALS,
               _plain("actuated signal", "brown", "$a$", ":", rival=False)),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -11,11 +12,15 @@ import numpy.typing as npt
 from figures.junction import drawing
 from figures.whole import HeadSpan, head_spans
 from minisim.errors import InputError
+from minisim.junction.movements import Bools
 from minisim.junction.paths import Floats
 from minisim.junction.turns import indicator
 from minisim.results.queues import queueing
 from minisim.results.run import Run
 from minisim.results.trajectories import movement_index
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Rows = npt.NDArray[np.int64]
 
@@ -53,11 +58,7 @@ class Frames:
         self.type = run.columns.type[frame["vehicle"].to_numpy()]
         clear = self.exit[self.path] + np.array([it.length for it in site.types])[self.type]
         released = frame["right_of_way"].to_numpy() & (self.s <= clear)
-        vehicle = frame["vehicle"].to_numpy()
-        order = np.argsort(vehicle, kind="stable")
-        first = np.diff(vehicle[order], prepend=-1) != 0
-        self.queueing = np.empty(len(frame), dtype=bool)
-        self.queueing[order] = queueing(frame["speed_mps"].to_numpy()[order], first)
+        self.queueing = _queueing(frame)
         self.state = np.where(released, RELEASED, np.where(self.queueing, QUEUEING, DRIVING))
         self._bearing = np.array([site.intersection.arms[p.exit_arm].bearing for p in paths])
         self._heads: dict[int, list[HeadSpan]] = {}
@@ -186,3 +187,12 @@ class Frames:
             ]
             rings.append(ring + np.mean(centres, axis=0))
         return rings
+
+
+def _queueing(frame: pd.DataFrame) -> Bools:
+    """Which rows of trajectories, which are sorted by time, are of a vehicle in a queue."""
+    vehicle, speed = frame["vehicle"].to_numpy(), frame["speed_mps"].to_numpy()
+    order = np.argsort(vehicle, kind="stable")
+    out = np.empty(len(frame), dtype=bool)
+    out[order] = queueing(speed[order], np.diff(vehicle[order], prepend=-1) != 0)
+    return out
