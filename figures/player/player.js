@@ -254,7 +254,7 @@ class Pane {
     const name = player.make("b", "", caption);
     name.textContent = name.title = data.controller;
     this.counts = player.make("span", "counts", caption);
-    this.counts.title = "standing: vehicles in the picture that stand; served: those that have left the junction since the start of the scene, without a collision";
+    this.counts.title = "in queues: vehicles in the picture that stand, or have moved up no faster than 10 km/h since; served: those that have left the junction since the start of the scene, without a collision";
     player.make("span", "what", caption).textContent = `${data.title} · ${data.demand} · profile ${data.profile} · seed ${data.seed}`;
     this.canvas = player.make("canvas", "junction", this.figure);
     this.canvas.setAttribute("role", "img");
@@ -312,7 +312,7 @@ class Pane {
     this.drawCrashes(pen, step, k, at);
     this.drawNames(pen, k, at);
     const seen = near.filter((it) => Math.max(Math.abs(it.x), Math.abs(it.y)) <= reach);
-    const counts = [`standing ${seen.filter((it) => it.stands).length}`, `served ${lastAt(scene.cleared, step, (it) => it) + 1}`];
+    const counts = [`in queues ${seen.filter((it) => it.stands).length}`, `served ${lastAt(scene.cleared, step, (it) => it) + 1}`];
     if (scene.data.collisions.length) counts.unshift(`collisions ${scene.data.collisions.filter(([s]) => s <= step).length}`);
     player.write(this.counts, counts.join(" · "));
     this.tell();
@@ -778,7 +778,7 @@ class Player extends HTMLElement {
     const scenes = this.panes.map((it) => it.scene), some = (test) => scenes.some(test), rows = [];
     const row = (kind, colour, text, extra = "") => rows.push([kind, colour, text, extra]);
     row("body", "goes", "has the right of way; band: its way");
-    row("body", "stands", "stands");
+    row("body", "stands", "in a queue");
     row("body", "moves", "moves");
     row("arrow", "ink", "to its exit; lamps blink if it turns");
     if (some((it) => it.tracks.some((track) => track.human))) row("body outline", "moves", "dark outline: human driver");

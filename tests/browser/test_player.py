@@ -364,7 +364,7 @@ def test_a_collision_is_counted(browser: Browser, tmp_path: Path) -> None:
     Player(scene(run, start=20.0, seconds=35.0)).save(file)
     shown = opened(browser, file, (1280, 720))
     shown.run(f"{PLAYER}.time = {PLAYER}.last")
-    assert shown.run(f"{PART}('.counts').textContent").startswith("collisions 1 · standing")
+    assert shown.run(f"{PART}('.counts').textContent").startswith("collisions 1 · in queues")
     assert shown.run(f"{PART}('.counts').textContent").endswith("served 0")
     assert "2 recorded arrivals" in shown.run(f"{PART}('.what').textContent")
     assert "crossed out" in shown.run(f"{PART}('.legend').textContent")
