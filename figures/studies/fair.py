@@ -42,7 +42,7 @@ def crossing_figure(results: Results) -> Figure:
     """The demands at which DIM does worse than each rival, with both gates."""
     known = needed_losses(results)
     figure, panels = plots.panels(
-        11.0, 7.4, len(MEASURES), left=0.18, right=0.985, top=0.82, bottom=0.1, wspace=0.06
+        11.0, 7.4, len(MEASURES), left=0.18, right=0.985, top=0.805, bottom=0.1, wspace=0.06
     )
     for axes, measure in zip(panels, MEASURES, strict=True):
         for place, rival in enumerate(OTHERS):
@@ -61,7 +61,7 @@ def crossing_figure(results: Results) -> Figure:
         "its 95 % interval\nhollow marker: on average at all of these demands (on the left) or at "
         "none (on the right)"
     )
-    style.write(figure, plots.LEFT, 0.892, words, 8.5)
+    style.write(figure, plots.LEFT, 0.872, words, 8.5)
     return figure
 
 

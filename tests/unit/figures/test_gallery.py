@@ -98,8 +98,9 @@ def test_everything_can_be_made_and_nothing_is_cut_off(name: str, archive: Archi
         if text.get_text() and text.get_visible() and box.width:
             assert -1 <= box.x0 <= box.x1 <= drawing.bbox.x1 + 1, text
             assert box.y1 <= drawing.bbox.y1 + 1, text
-    legends = [legend.get_window_extent() for legend in drawing.legends]
-    assert not any(one.overlaps(other) for one, other in combinations(legends, 2))
+    texts = (text for text in drawing.texts if text.get_text())
+    above = [item.get_window_extent() for item in (*texts, *drawing.legends)]
+    assert not any(one.overlaps(other) for one, other in combinations(above, 2))
 
 
 def test_every_study_is_drawn_and_every_need_is_a_study() -> None:
