@@ -18,11 +18,15 @@ try:
 except ImportError as error:
     raise MissingExtraError(f"environments need {error.name}: {extra('gym')}") from error
 
+from scenarios.environments.batch import RightOfWayBatch
 from scenarios.environments.right_of_way import RightOfWayEnv
 from scenarios.environments.signal import SignalEnv
 from scenarios.environments.vehicles import VehiclesEnv
 
-__all__ = ["RightOfWayEnv", "SignalEnv", "VehiclesEnv"]
+__all__ = ["RightOfWayBatch", "RightOfWayEnv", "SignalEnv", "VehiclesEnv"]
 
-gymnasium.register("minisim/RightOfWay-v0", entry_point="scenarios.environments:RightOfWayEnv")
+gymnasium.register(
+    "minisim/RightOfWay-v0", entry_point="scenarios.environments:RightOfWayEnv",
+    vector_entry_point="scenarios.environments:RightOfWayBatch",
+)  # fmt: skip
 gymnasium.register("minisim/Signal-v0", entry_point="scenarios.environments:SignalEnv")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from itertools import groupby
+from itertools import groupby, takewhile
 from typing import NamedTuple
 
 from baselines.signals.heads import committed
@@ -45,11 +45,12 @@ class Passing:
         asking: list[Observed] = []
         for lane in self._lanes(view):
             inside = [v for v in lane if v.distance < 0.0]
-            going = [v for v in lane if v.distance >= 0.0 and v.id in self._going]
+            before = lane[len(inside) :]
+            going = list(takewhile(lambda v: v.id in self._going, before))
             settled += inside
             sure = committed(going, self._stops)
             settled += sure
-            rest = lane[len(inside) + len(sure) :]
+            rest = before[len(sure) :]
             if rest and rest[0].distance <= self._sight:
                 asking.append(rest[0])
         return Junction(settled, asking)

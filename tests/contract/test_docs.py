@@ -16,7 +16,7 @@ from minisim.simulation import simulate
 from tests import ROOT
 from tests.builders import digest
 
-DOCS = "benchmark", "counts", "messages", "pcu", "safety", "stepping"
+DOCS = "benchmark", "counts", "messages", "pcu", "safety", "scene", "stepping"
 PAGES = ("README.md", *(f"docs/{name}.md" for name in DOCS))
 
 

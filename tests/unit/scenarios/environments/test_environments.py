@@ -302,3 +302,44 @@ def test_without_the_extra_it_says_what_to_install() -> None:
     code = "import sys; sys.modules['pettingzoo'] = None; import scenarios.environments"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert "environments need pettingzoo: pip install 'minisim-traffic[gym]'" in done.stderr
+
+
+@pytest.mark.parametrize("make", [three_way, four_way, five_way])
+def test_a_batch_is_as_many_single_ones(make: Any) -> None:
+    """Also when episodes end and begin again, each at its own time."""
+    scenario = dataclasses.replace(make(density=400.0, horizon=90.0, warmup=0.0), demand_time=20.0)
+    batch = gymnasium.make_vec("minisim/RightOfWay-v0", num_envs=3, scenario=scenario)
+    assert isinstance(batch, environments.RightOfWayBatch)
+    single = [environments.RightOfWayEnv(scenario) for _ in range(3)]
+    seen, _ = batch.reset(seed=5)
+    for k, env in enumerate(single):
+        assert seen[k] == pytest.approx(env.reset(seed=5 + k)[0], abs=1e-6)
+    random, begins, episodes = np.random.default_rng(1), [False] * 3, 0
+    for _ in range(150):
+        actions = random.integers(0, 2, batch.action_space.shape).astype(np.int8)
+        seen, rewards, terminated, truncated, info = batch.step(actions)
+        for k, env in enumerate(single):
+            if begins[k]:
+                own: Any = (*env.reset(), {})
+                own = own[0], 0.0, False, False, own[1]
+            else:
+                own = env.step(actions[k])
+            assert seen[k] == pytest.approx(own[0], abs=1e-6)
+            assert rewards[k] == pytest.approx(own[1])
+            assert (terminated[k], truncated[k]) == own[2:4]
+            assert info["time"][k] == own[4]["time"]
+            assert np.array_equal(info["action_mask"][k], own[4]["action_mask"])
+            begins[k] = own[2] or own[3]
+            episodes += begins[k]
+    assert episodes >= 3
+
+
+def test_a_batch_of_none_and_seeds_of_each() -> None:
+    with pytest.raises(InputError, match="num_envs must be an integer 1"):
+        environments.RightOfWayBatch(0)
+    batch = environments.RightOfWayBatch(2, short(100.0, density=600.0))
+    batch.reset(seed=[7, 7])
+    for _ in range(60):
+        seen, *_ = batch.step(np.ones((2, 12), np.int8))
+    assert np.array_equal(seen[0], seen[1])
+    assert seen[0].any()
