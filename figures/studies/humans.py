@@ -45,7 +45,7 @@ def human_figure(results: Results) -> Figure:
                          linewidth=1.1)  # fmt: skip
         style.plot_axes(axes, f"{density:g} veh/h/lane", "human drivers [%]", "")
         axes.set_xticks([100.0 * share for share in SHARES[::2]])
-        plots.log_time(axes, 1.0, 1000.0)
+        plots.log_time(axes, 1.0, 2000.0)
     panels[0].set_ylabel("mean delay of all vehicles [s], logarithmic", **style.LABEL)
     note = (
         f"{missing_note(results)}  Delay is time loss and departure delay, up to the end of the "
