@@ -108,16 +108,15 @@ class Vehicles:
 
     def _follow(self, unit: Unit, new: Order) -> Iterator[Command]:
         old, unit.order = unit.order, new
-        if new.go and not unit.holds:
-            unit.holds = True
-            yield Go(new.vehicle)
-        elif (
-            unit.holds and not (new.go or unit.passage) and self._stops(self._present[new.vehicle])
-        ):
-            unit.holds = False
-            yield Hold(new.vehicle)
-        if new.speed != old.speed and unit.passage is None:
-            yield Advise(new.vehicle, new.speed)
+        if unit.passage is None:
+            if new.go and not unit.holds:
+                unit.holds = True
+                yield Go(new.vehicle)
+            elif unit.holds and not new.go and self._stops(self._present[new.vehicle]):
+                unit.holds = False
+                yield Hold(new.vehicle)
+            if new.speed != old.speed:
+                yield Advise(new.vehicle, new.speed)
         if new.braking != old.braking:
             yield Brake(new.vehicle, new.braking)
 

@@ -40,13 +40,12 @@ LATE = SITE.with_channel(Channel(latency=0.2, loss=0.1))
 
 
 def answered(
-    run: ReservationSession | FlowSession, time: float, *cars: Observed, holding: tuple[int, ...] = (),
-    said: float | None = None, follows: bool = True,
+    run: ReservationSession | FlowSession, time: float, *cars: Observed,
+    holding: tuple[int, ...] = (), said: float | None = None, follows: bool = True,
 ) -> list[tuple[int, float]]:  # fmt: skip
     """The promises [s], if the vehicles in `holding` say at `said` that they hold one."""
-    reports = {
-        it.id: Report(time if said is None else said, it.id in holding, follows) for it in cars
-    }
+    said = time if said is None else said
+    reports = {it.id: Report(said, it.id in holding, follows) for it in cars}
     commands = run.decide(View(time, cars, reports))
     return [(it.vehicle, it.time) for it in commands if isinstance(it, Reserve)]
 
@@ -54,7 +53,7 @@ def answered(
 @pytest.mark.parametrize(
     ("make", "latency"),
     [(Reservation(), 0.0), (Reservation(), 2.0), (Slots(), 0.4), (Platoons(), 1.0)],
-    ids=str,
+    ids=["reservation", "reservation, late", "slots", "platoons, late"],
 )
 def test_every_promise_comes_true_if_no_message_is_lost(
     make: Reservation | Flow, latency: float
@@ -170,10 +169,10 @@ def test_a_promise_waits_until_its_vehicle_follows_the_advice_before() -> None:
 @pytest.mark.parametrize(
     ("make", "density", "loss", "most"),
     [(Reservation(), 250.0, 0.9, 20.0), (Slots(), 150.0, 0.6, 5.0), (Platoons(), 150.0, 0.6, 5.0)],
-    ids=str,
+    ids=["reservation", "slots", "platoons"],
 )
 def test_loss_costs_seconds(make: Controller, density: float, loss: float, most: float) -> None:
     """Promises that are sent once cost 165 s at 90 % loss, and right of way one by one 18 s."""
-    scenario = four_way(density, profile="fair", horizon=600.0)
+    scenario = four_way(density, profile="fair", horizon=400.0)
     run = minisim.simulate(scenario, Linked(make, Channel(loss=loss)), 1)
     assert run.summary(["time_loss_s"])["time_loss_s"] < most
