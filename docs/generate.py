@@ -13,7 +13,8 @@ from scenarios.controllers import CONTROLLERS, maker_of
 #: Packages whose `__all__` is what users import.
 PACKAGES = (
     "minisim", "dim", "baselines", "scenarios", "figures",
-    "minisim.counts", "minisim.town", "minisim.sumo", "scenarios.crossval", "scenarios.sweep",
+    "minisim.control", "minisim.counts", "minisim.town", "minisim.sumo",
+    "scenarios.crossval", "scenarios.sweep",
 )  # fmt: skip
 
 

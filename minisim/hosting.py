@@ -15,6 +15,7 @@ import numpy as np
 
 from minisim.arrivals import Arrivals
 from minisim.control import (
+    NO_REPORTS,
     Advise,
     Brake,
     Close,
@@ -114,6 +115,11 @@ class Hosted:
     exchange: Counter[str] = field(default_factory=Counter)  # see `Run.exchange`
     times: list[int] = field(default_factory=list)  # of the decisions [ns]
     witness: Witness | None = None  # what writes down reasons, if the run is to be explained
+
+    @property
+    def shared(self) -> tuple[object, ...]:
+        """What no run changes, so that forks of it share them."""
+        return self.scenario, self.controller, self.arrivals, self.plan, self.site, NO_REPORTS
 
     def ask(self, view: View, tick: int) -> list[Command]:
         """Show the session its view at `tick` and return its commands.

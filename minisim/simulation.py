@@ -10,7 +10,6 @@ from functools import partial
 import numpy as np
 
 from minisim.control import (
-    NO_REPORTS,
     Advise,
     Brake,
     Close,
@@ -24,7 +23,7 @@ from minisim.control import (
     Wake,
 )
 from minisim.engine import kernel
-from minisim.engine.collision import Collision, collisions_now
+from minisim.engine.collision import collisions_now
 from minisim.engine.cruise.law import build_cruise
 from minisim.engine.moving import CLEAR, MARKED
 from minisim.engine.packed import empty_pack, store
@@ -37,24 +36,21 @@ from minisim.engine.state import (
     build_layout,
     build_vehicles,
 )
-from minisim.errors import InputError, choice, number
+from minisim.errors import InputError
 from minisim.hosting import AFTERMATH, REACTIONS, Alarm, Hosted, begin
 from minisim.jit import direct
 from minisim.laws import build_law
-from minisim.results.run import Run, ScenarioLike
+from minisim.results.run import Given, Run, ScenarioLike
 from minisim.results.trips import collect_trips
-from minisim.ticks import NEVER, first_tick, time_of
+from minisim.stepping import Stepped, repeated
+from minisim.ticks import NEVER
 from minisim.vehicle import CruiseVehicle
 
 #: `Observed._make` without its check of the number of fields, which `OBSERVED` guarantees.
 _as_observed: Callable[[Iterable[float]], Observed] = partial(tuple.__new__, Observed)
 
 
-#: Of `Simulation.run_until`.
-EVENTS = ("wake", "collision")
-
-
-class Simulation:
+class Simulation(Stepped):
     """One run: vehicles on their paths, advanced under a controller.
 
     Args:
@@ -86,11 +82,12 @@ class Simulation:
         timed: bool = False,
         explain: bool = False,
     ) -> None:
-        self._hosted = hosted = begin(
+        hosted = begin(
             scenario, controller, seed, record=record, record_window=record_window,
             on_collision=on_collision, reactions=REACTIONS, timed=timed, explain=explain,
         )  # fmt: skip
-        self.site, plan = hosted.site, hosted.plan
+        super().__init__(hosted)
+        plan = hosted.plan
         teleports = on_collision == "teleport"
         if teleports and not isinstance(self.site.vehicle, CruiseVehicle):
             raise InputError("on_collision 'teleport' needs a CruiseVehicle")
@@ -107,83 +104,7 @@ class Simulation:
         self._bodies = np.zeros((16 * self.site.intersection.n, 6))
         self._observed = np.zeros(len(self._vehicles) + 1, OBSERVED)
         self._seen = 0
-        self._collisions: dict[tuple[int, int], Collision] = {}
-        self._horizon_tick = first_tick(scenario.horizon, self.site.dt)
         self._alarm = Alarm(plan.period, self.site.dt)
-        self._stride = 1 if explain else NEVER  # most steps between two looks for reasons
-        self._given: list[tuple[int, tuple[Command, ...]]] = []  # commands from outside, by tick
-        self._started = False
-        self._done = False
-        self.tick = 0
-
-    @property
-    def time(self) -> float:
-        """Simulated time [s]."""
-        return time_of(self.tick, self.site.dt)
-
-    @property
-    def finished(self) -> bool:
-        """Whether the horizon is reached or every vehicle has arrived."""
-        return self._done or self.tick >= self._horizon_tick
-
-    @property
-    def collisions(self) -> tuple[Collision, ...]:
-        """The collisions so far, each pair of vehicles once."""
-        return tuple(self._collisions.values())
-
-    def advance(self, until: float) -> None:
-        """Advance to time `until` [s], to the horizon, or to the last arrival.
-
-        Raises:
-            CollisionError: two bodies touched, unless collisions are only recorded.
-            ControllerError: the controller answered with something that is not a command.
-        """
-        until = number("until [s]", until, low=0)
-        for _ in self._stretches(first_tick(until, self.site.dt)):
-            pass
-
-    def run_until(self, event: float | str | Callable[[Simulation], bool]) -> bool:
-        """Advance until something happens, or to the end of the run.
-
-        Args:
-            event: a time [s]; "wake", whenever the plan wakes the session, first at time 0;
-                "collision", when one is recorded; or a function that is asked after each step.
-
-        Returns:
-            Whether it happened. If not, the run is over.
-
-        Raises:
-            InputError: no such event.
-            CollisionError, ControllerError: as `advance` raises them.
-        """
-        if not isinstance(event, str) and not callable(event):
-            self.advance(event)
-            return self.tick >= first_tick(event, self.site.dt)
-        by_step, before = callable(event), len(self._collisions)
-        if isinstance(event, str):
-            choice("event", event, EVENTS)
-        for woken in self._stretches(self._horizon_tick, 1 if by_step else NEVER):
-            if callable(event):
-                happened = event(self)
-            else:
-                happened = woken if event == "wake" else len(self._collisions) > before
-            if happened:
-                return True
-        return False
-
-    def command(self, *commands: Command) -> None:
-        """Carry out commands from outside; what is set at a time acts from the next step on.
-
-        If the session is woken at the same time, it has decided before, so these count.
-
-        Raises:
-            InputError: one of them cannot be carried out; then none is.
-        """
-        self._hosted.take(commands, self.tick)
-        self._begin()
-        self._given.append((self.tick, commands))
-        for command in commands:
-            self._apply(command)
 
     def fork(self) -> Simulation:
         """A copy that goes on by itself: left alone, both give identical trips.
@@ -192,20 +113,8 @@ class Simulation:
         the session with its random streams included. What a session keeps must be in attributes: a
         closure or a generator cannot be copied.
         """
-        hosted = self._hosted
-        shared = (
-            hosted.scenario, hosted.controller, hosted.arrivals, hosted.plan,
-            self.site, self._layout, self._law, NO_REPORTS,
-        )  # fmt: skip
+        shared = *self._hosted.shared, self._layout, self._law
         return deepcopy(self, {id(it): it for it in shared})
-
-    def _begin(self) -> bool:
-        """Ask the session for the first time; returns whether it is now."""
-        if self._started:
-            return False
-        self._started = True
-        self._decide()
-        return True
 
     def _stretches(self, target: int, most: int = NEVER) -> Iterator[bool]:
         """Advance, at most `most` steps at once; yields each time whether the session was woken."""
@@ -234,11 +143,6 @@ class Simulation:
                 self._hosted.look(self.view())
             yield woken
 
-    def run(self) -> Run:
-        """Advance to the end and return the result."""
-        self.advance(self._horizon_tick * self.site.dt)
-        return self.result()
-
     def view(self) -> View:
         """What a session would be shown now; steps change it, commands do not."""
         return View(self.time, tuple(map(_as_observed, self._observed[: self._seen].tolist())))
@@ -259,7 +163,10 @@ class Simulation:
 
     def _decide(self) -> None:
         self._alarm.reset(self.tick)
-        for command in self._hosted.ask(self.view(), self.tick):
+        self._carry_out(self._hosted.ask(self.view(), self.tick))
+
+    def _carry_out(self, commands: Iterable[Command]) -> None:
+        for command in commands:
             self._apply(command)
 
     def _apply(self, command: Command) -> None:
@@ -293,16 +200,8 @@ class Simulation:
         self._traced = 0
 
 
-def _replay(
-    hosted: Hosted,
-    given: tuple[tuple[int, tuple[Command, ...]], ...],
-    time: float,
-    seconds: float = 10.0,
-) -> Run:
-    """Run again until shortly after `time`; record the last `seconds` before it.
-
-    Commands `given` from outside are given again at their ticks.
-    """
+def _replay(hosted: Hosted, given: tuple[Given, ...], time: float, seconds: float = 10.0) -> Run:
+    """Run again until shortly after `time`; record the last `seconds` before it."""
     again = Simulation(
         hosted.scenario,
         hosted.controller,
@@ -311,11 +210,7 @@ def _replay(
         record_window=(max(0.0, time - seconds), math.inf),
         on_collision="record",
     )
-    for tick, commands in given:
-        again.advance(time_of(tick, again.site.dt))
-        again.command(*commands)
-    again.advance(time + AFTERMATH)
-    return again.result()
+    return repeated(again, given, time + AFTERMATH)
 
 
 def simulate(

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from minisim.errors import InputError, integer, number
+from minisim.errors import integer, number
 from minisim.reasons import Reason, Told
-from minisim.ticks import first_tick, time_of
+from minisim.ticks import first_tick
 
 if TYPE_CHECKING:
     from minisim.results.run import Run
+    from minisim.stepping import Stepped
 
 #: A time may be off by this much through rounding [s].
 ROUNDING = 1e-6
@@ -77,16 +78,20 @@ def account_of(run: Run) -> Account:
     whole = run.record == "all" and since == 0.0 and until >= run.columns.end
     if run.reasons is not None and whole:
         return Account(run)
-    if run.host["host"] != "minisim":
-        raise InputError("this run has no reasons: simulate with explain=True and record='all'")
+    from minisim.stepping import repeated
+
+    with _again(run) as again:
+        return Account(repeated(again, run.given, run.columns.end))
+
+
+def _again(run: Run) -> Stepped:
+    """A run that has yet to be made again, in the same host, so that it says why."""
+    options: dict[str, Any] = {"record": "all", "explain": True, "on_collision": "record"}
+    if run.host["host"] == "sumo":
+        from minisim.sumo import Simulation as Sumo
+
+        options["model"] = run.host["sumo_model"]
+        return Sumo(run.scenario, run.controller, seed=run.seed, **options)
     from minisim.simulation import Simulation
 
-    again = Simulation(
-        run.scenario, run.controller, seed=run.seed, record="all", explain=True,
-        on_collision="record",
-    )  # fmt: skip
-    for tick, commands in run.given:
-        again.advance(time_of(tick, run.site.dt))
-        again.command(*commands)
-    again.advance(run.columns.end)
-    return Account(again.result())
+    return Simulation(run.scenario, run.controller, seed=run.seed, **options)

@@ -9,6 +9,7 @@ This package is the only one that runs SUMO. `minisim.town` reads the format of 
 
 from __future__ import annotations
 
-from minisim.sumo.host import MODELS, simulate
+from minisim.sumo.prepare import MODELS
+from minisim.sumo.simulation import Simulation, simulate
 
-__all__ = ["MODELS", "simulate"]
+__all__ = ["MODELS", "Simulation", "simulate"]

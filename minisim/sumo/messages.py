@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import pickle
+from collections.abc import Sequence
+from contextlib import suppress
 from typing import IO, Any, NamedTuple
 
-from minisim.control import Observed, Plan
+from minisim.control import Command, Observed, Plan
 from minisim.engine.collision import Collision
 from minisim.engine.cruise.law import Cruise
 from minisim.engine.state import Layout, Records
@@ -38,16 +40,22 @@ class Channel:
     """The pipes to the other process."""
 
     def __init__(self, source: IO[bytes], target: IO[bytes]) -> None:
-        self._source, self._target = source, target
+        self.source, self.target = source, target
 
     def receive(self) -> Any:
         """The next object; `EOFError` if the other process is gone."""
-        return pickle.load(self._source)
+        return pickle.load(self.source)
 
     def send(self, message: object) -> None:
         """Send an object."""
-        pickle.dump(message, self._target)
-        self._target.flush()
+        pickle.dump(message, self.target)
+        self.target.flush()
+
+    def close(self) -> None:
+        """Close both pipes, whether or not anyone listens."""
+        for pipe in (self.source, self.target):
+            with suppress(OSError):
+                pipe.close()
 
 
 class Started(NamedTuple):
@@ -57,10 +65,28 @@ class Started(NamedTuple):
 
 
 class Asked(NamedTuple):
-    """A wake-up, with what to show the session. The answer is a list of commands."""
+    """A stop, with what a view shows then.
+
+    The answer is a `Proceed`, `None` to end the run here, or a `Fork`, answered by its process id.
+    """
 
     tick: int
+    woken: bool  #: whether the session is to be asked
     vehicles: tuple[Observed, ...]
+    collisions: tuple[Collision, ...]  #: since the last stop
+
+
+class Proceed(NamedTuple):
+    """Carry out these commands and go on to the next wake-up or collision, or to this tick."""
+
+    commands: Sequence[Command]
+    until: int
+
+
+class Fork(NamedTuple):
+    """Become two processes; the new one talks through pipes in its own folder."""
+
+    folder: str
 
 
 class Ended(NamedTuple):
@@ -68,6 +94,7 @@ class Ended(NamedTuple):
 
     tick: int  #: the last one reached
     done: bool  #: whether all vehicles have arrived
+    vehicles: tuple[Observed, ...]  #: in the last view
     collisions: tuple[Collision, ...]  #: each pair of vehicles once
     time_loss: dict[int, float]  #: of every vehicle by id [s]
     trace: Records  #: what was recorded

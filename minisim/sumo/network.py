@@ -12,6 +12,7 @@ coordinates then start at the lower left corner, netconvert's default.
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import subprocess
 import xml.etree.ElementTree as ET
@@ -23,7 +24,7 @@ from pathlib import Path
 import numpy as np
 
 from minisim.control import Site
-from minisim.errors import FileError, SumoError
+from minisim.errors import FileError, MissingExtraError, SumoError, extra
 from minisim.junction.geometry import Intersection
 from minisim.results.trajectories import lane_names
 
@@ -107,6 +108,17 @@ def run_tool(command: list[str], folder: Path, home: Path) -> None:
     if done.returncode:
         said = done.stderr.strip() or done.stdout.strip() or "it said nothing"
         raise SumoError(f"{name} failed (exit code {done.returncode}): {said}")
+
+
+def sumo_home() -> Path:
+    """SUMO's folder; raises `MissingExtraError` with the command that installs SUMO."""
+    origin = None
+    for package in ("libsumo", "sumo"):
+        found = importlib.util.find_spec(package)
+        origin = found and found.origin
+        if origin is None:
+            raise MissingExtraError(f"the host SUMO needs the package {package}: {extra('sumo')}")
+    return Path(str(origin)).parent  # importing it would change the environment
 
 
 def sumo_environment(home: Path) -> dict[str, str]:

@@ -24,7 +24,8 @@ from minisim.engine.state import TRACE, Records
 from minisim.hosting import Alarm
 from minisim.laws import Traits
 from minisim.sumo.cruising import Cruiser
-from minisim.sumo.messages import Asked, Channel, Ended, Failed, Job, Started
+from minisim.sumo.forks import forked
+from minisim.sumo.messages import Asked, Channel, Ended, Failed, Fork, Job, Started
 from minisim.sumo.steering import Car, Follower, Steering, limits
 from minisim.ticks import NEVER, time_of
 
@@ -44,7 +45,7 @@ class Worker:
     """
 
     def __init__(self, job: Job, libsumo: Any, caller: Channel) -> None:
-        self._job, self._libsumo, self._caller = job, libsumo, caller
+        self.job, self._libsumo, self._caller = job, libsumo, caller
         layout, law = job.layout, job.law
         self._steering: Steering = (
             Follower(job, libsumo) if job.cruise is None else Cruiser(job, libsumo, job.cruise)
@@ -70,30 +71,39 @@ class Worker:
         self._lines: list[tuple[int, int, float, float, float, bool]] = []
         self._traces: list[Records] = []
         self._alarm = Alarm(job.plan.period, law.dt)
-        self._tick = self._arrived = 0
+        self._tick = self._arrived = self._told = 0
+        self._pause = 0  # the tick at which the caller wants to be asked
 
     def run(self) -> Ended:
-        """Advance to the horizon, the last arrival, or a collision that ends the run."""
-        job = self._job
+        """Advance to the horizon, the last arrival, a collision that ends the run, or until told.
+
+        A step begins at the state of the last view, so what is commanded then acts in it.
+        """
+        job = self.job
         self._steering.load(self._cars.values())
-        self._decide()
+        goes_on = self._ask(woken=True)
         self._libsumo.simulationStep()
         passed = self._observe()
-        while self._tick < job.horizon and not self._done:
+        while goes_on and self._tick < job.horizon and not self._done:
             if job.stop_on_collision and self._collisions:
                 break
-            if passed or self._tick >= self._alarm.tick:
-                self._decide()
+            woken = passed or self._tick >= self._alarm.tick
+            if woken or self._tick >= self._pause or len(self._collisions) > self._told:
+                goes_on = self._ask(woken)
+                if not goes_on:
+                    break
             self._steering.steer(self._lanes, self._released)
             self._libsumo.simulationStep()
             self._tick += 1
             passed = self._observe()
             self._collide()
+        vehicles = tuple(self._view())
         for name in self._libsumo.vehicle.getIDList():
             self._glance(self._cars[name])
         return Ended(
             tick=self._tick,
             done=self._done,
+            vehicles=vehicles,
             collisions=tuple(self._collisions.values()),
             time_loss={car.id: car.lost_ticks * job.law.dt for car in self._cars.values()},
             trace=np.concatenate([*self._traces, np.array(self._lines, TRACE)]),
@@ -103,15 +113,24 @@ class Worker:
     def _done(self) -> bool:
         return self._arrived == len(self._cars)
 
-    def _decide(self) -> None:
-        """Ask for the session's commands, and carry them out."""
-        self._alarm.reset(self._tick)
-        self._caller.send(Asked(self._tick, tuple(self._view())))
-        for command in self._caller.receive():
+    def _ask(self, woken: bool) -> bool:
+        """Show a view, and carry out the commands that come back; returns whether to go on."""
+        if woken:
+            self._alarm.reset(self._tick)
+        news = tuple(self._collisions.values())[self._told :]
+        self._told = len(self._collisions)
+        self._caller.send(Asked(self._tick, woken, tuple(self._view()), news))
+        while isinstance(answer := self._caller.receive(), Fork):
+            self.job = forked(self.job, self._caller, answer)
+        if answer is None:
+            return False
+        commands, self._pause = answer
+        for command in commands:
             self._apply(command)
+        return True
 
     def _view(self) -> Iterator[Observed]:
-        law, movements = self._job.law, self._job.movements
+        law, movements = self.job.law, self.job.movements
         for lane in self._lanes:
             for car in lane:
                 distance = law.entry - car.s
@@ -146,7 +165,7 @@ class Worker:
     def _observe(self) -> bool:
         """Read the new state; returns whether to wake the session."""
         sumo = self._libsumo
-        if self._tick < self._job.horizon:
+        if self._tick < self.job.horizon:
             for name in sumo.simulation.getDepartedIDList():
                 self._depart(self._cars[name])
         passed = False
@@ -160,13 +179,13 @@ class Worker:
             travelled = values[sumo.VAR_DISTANCE]
             if travelled >= 0.0:  # not while SUMO teleports it
                 passed |= self._move(self._cars[name], travelled, values[sumo.VAR_SPEED])
-        return passed and not (self._job.law.wake_when_empty and self._occupied())
+        return passed and not (self.job.law.wake_when_empty and self._occupied())
 
     def _occupied(self) -> bool:
-        return any(car.s > self._job.law.entry for lane in self._lanes for car in lane)
+        return any(car.s > self.job.law.entry for lane in self._lanes for car in lane)
 
     def _depart(self, car: Car) -> None:
-        law = self._job.law
+        law = self.job.law
         car.present, car.seen = True, self._tick
         car.s = self._start[car.path] + car.traits.length + law.margin
         car.v = self._libsumo.vehicle.getSpeed(car.name)
@@ -189,17 +208,17 @@ class Worker:
 
     def _turn_to(self, car: Car) -> None:
         """Watch a vehicle from now on, or arrange the next glance at it."""
-        sumo, law = self._libsumo, self._job.law
+        sumo, law = self._libsumo, self.job.law
         ahead = self._near - car.s
         if ahead <= 0.0 and not self._unneeded(car):
             sumo.vehicle.subscribe(car.name, [sumo.VAR_DISTANCE, sumo.VAR_SPEED])
             return
-        seconds = min(GLANCE, ahead / self._job.top_speed) if ahead > 0.0 else GLANCE
+        seconds = min(GLANCE, ahead / self.job.top_speed) if ahead > 0.0 else GLANCE
         self._glances[self._tick + max(1, int(seconds / law.dt))].append(car)
 
     def _unneeded(self, car: Car) -> bool:
         """Whether the car has passed every place where it may be needed."""
-        return car.cleared and self._job.law.record_from == NEVER
+        return car.cleared and self.job.law.record_from == NEVER
 
     def _glance(self, car: Car) -> None:
         s = self._locate(car)
@@ -210,12 +229,12 @@ class Worker:
     def _travel(self, car: Car, s: float) -> None:
         """Add the time lost since the last look, and move on to `s`."""
         limit = self._limits[car.path][1][car.section] * car.factor
-        due = (s - car.s) / (limit * self._job.law.dt)
+        due = (s - car.s) / (limit * self.job.law.dt)
         car.lost_ticks += max(self._tick - car.seen - due, 0.0)
         car.s, car.seen = s, self._tick
 
     def _move(self, car: Car, travelled: float, v: float) -> bool:
-        law, p = self._job.law, car.path
+        law, p = self.job.law, car.path
         s = self._position(car, travelled)
         car.a, car.s, car.v = (v - car.v) / law.dt, s, v
         self._record(car)
@@ -236,7 +255,7 @@ class Worker:
 
     def _position(self, car: Car, travelled: float) -> float:
         """`s` of a vehicle that has driven `travelled` since its insertion [m]."""
-        law, network, p = self._job.law, self._job.network, car.path
+        law, network, p = self.job.law, self.job.network, car.path
         inside = travelled + car.traits.length + law.margin - network.approach[p]
         if inside <= 0.0:
             return float(law.entry + inside)
@@ -259,7 +278,7 @@ class Worker:
             self._turn_to(car)
 
     def _record(self, car: Car) -> None:
-        law = self._job.law
+        law = self.job.law
         past = car.s - car.traits.length - self._exit[car.path]
         here = car.s >= law.record_start and past <= law.record_past
         if here and law.record_from <= self._tick < law.record_to:
@@ -277,7 +296,7 @@ class Worker:
                 self._collisions[first, second] = self._describe(collision)
 
     def _describe(self, collision: Any) -> Collision:
-        names = self._job.movements.names
+        names = self.job.movements.names
         both = []
         for name, speed in (
             (collision.collider, collision.colliderSpeed),
@@ -285,7 +304,7 @@ class Worker:
         ):
             car = self._cars[name]
             both.append((car.id, names[car.path], self._touched(car, collision), float(speed)))
-        time = time_of(self._tick, self._job.law.dt)
+        time = time_of(self._tick, self.job.law.dt)
         return Collision(time, *zip(*sorted(both), strict=True))
 
     def _touched(self, car: Car, collision: Any) -> float:
@@ -302,15 +321,16 @@ def main() -> None:
         job: Job = caller.receive()
         import libsumo
 
+        worker = Worker(job, libsumo, caller)
         try:
             os.chdir(job.folder)
             libsumo.start(list(job.command))
             caller.send(Started(libsumo.getVersion()[1]))
-            ended = Worker(job, libsumo, caller).run()
+            ended = worker.run()
             libsumo.close()  # writes the trips
             caller.send(ended)
         except (libsumo.TraCIException, libsumo.FatalTraCIError) as error:
             caller.send(Failed(str(error)))
         except (EOFError, BrokenPipeError):
-            if job.temporary:  # the caller was killed and cannot remove it
-                shutil.rmtree(job.folder, ignore_errors=True)
+            if worker.job.temporary:  # the caller was killed and cannot remove it
+                shutil.rmtree(worker.job.folder, ignore_errors=True)

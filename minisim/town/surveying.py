@@ -126,8 +126,7 @@ def town_of(path: AnyPath, side: str | None = None) -> Town:
         if side is not None:
             raise InputError("side is for an extract of OpenStreetMap: a network knows its own")
         return town
-    from minisim.sumo.host import sumo_home
-    from minisim.sumo.network import run_tool
+    from minisim.sumo.network import run_tool, sumo_home
 
     home = sumo_home()
     with tempfile.TemporaryDirectory(prefix="minisim-town-") as folder:

@@ -89,7 +89,7 @@ def crossval(
     """Compare minisim, SUMO and the paper on common arrivals, trip by trip."""
     from minisim.demandfile import read_demand
     from minisim.files import make_folder
-    from minisim.sumo.host import sumo_home
+    from minisim.sumo.network import sumo_home
     from scenarios.crossval import Case, crossvalidate, film, replayed_cases, write_report
     from scenarios.crossval.report import CSV, REPORT, summary
     from scenarios.library import refuse_beside, scenario_named

@@ -69,7 +69,7 @@ def test_its_mapping_is_one(tmp_path: Path) -> None:
 
 def test_a_search_looks_ahead(capsys: pytest.CaptureFixture[str]) -> None:
     """The examples in docs/stepping.md: DIM from outside, and a tree search."""
-    outside, search = blocks("docs/stepping.md")
+    outside, _, search = blocks("docs/stepping.md")  # the other one: `tests/sumo/test_stepping.py`
     made: dict[str, Any] = {}
     exec(compile(outside, "docs/stepping.md", "exec"), made)
     assert digest(made["run"]) == digest(simulate(made["scenario"], Dim(), 1))

@@ -17,7 +17,7 @@ import pytest
 import minisim
 from minisim.control import Controller
 from minisim.results.run import Run
-from minisim.sumo import host, network, simulate
+from minisim.sumo import network, process, simulate
 from tests.sumo.forking import Forked, forking
 
 NEEDED = ("libsumo", "sumo", "sumolib")
@@ -44,13 +44,15 @@ def _quick_starts(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(network, "run_tool", converted)
     if hasattr(os, "fork"):
         popen = partial(Forked, request.getfixturevalue("server"))
-        monkeypatch.setattr(host, "subprocess", SimpleNamespace(Popen=popen, PIPE=subprocess.PIPE))
+        monkeypatch.setattr(
+            process, "subprocess", SimpleNamespace(Popen=popen, PIPE=subprocess.PIPE)
+        )
 
 
 @pytest.fixture
 def started(monkeypatch: pytest.MonkeyPatch) -> None:
     """SUMO's processes are started as users start them."""
-    monkeypatch.setattr(host, "subprocess", subprocess)
+    monkeypatch.setattr(process, "subprocess", subprocess)
     monkeypatch.setattr(network, "run_tool", RUN_TOOL)
 
 

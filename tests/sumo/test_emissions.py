@@ -14,7 +14,7 @@ from minisim.results.driving import co2, fuel
 from minisim.results.emissions import CLASSES, rate
 from minisim.results.run import Run
 from minisim.results.trips import Floats
-from minisim.sumo.host import sumo_home
+from minisim.sumo.network import sumo_home
 from scenarios import four_way
 
 

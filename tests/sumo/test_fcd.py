@@ -10,13 +10,13 @@ import pandas as pd
 
 from dim import Dim
 from minisim.results.trajectories import write_fcd
-from minisim.sumo import host, simulate
+from minisim.sumo import network, simulate
 from scenarios import four_way
 
 
 def as_table(file: Path) -> pd.DataFrame:
     """What SUMO's `xml2csv.py` makes of the file."""
-    tool = host.sumo_home() / "tools" / "xml" / "xml2csv.py"
+    tool = network.sumo_home() / "tools" / "xml" / "xml2csv.py"
     table = file.with_suffix(".csv")
     subprocess.run(
         [sys.executable, str(tool), "-s", ",", "-o", str(table), str(file)],

@@ -28,7 +28,7 @@ from minisim.control import Site
 from minisim.junction.conflicts import CLEARANCE, separation
 from minisim.junction.geometry import Intersection
 from minisim.junction.movements import ARM_NAMES, Movement
-from minisim.sumo import host, network
+from minisim.sumo import network
 from minisim.vehicle import VehicleType
 from scenarios.strategies import intersections
 
@@ -85,7 +85,7 @@ def site_of(intersection: Intersection) -> Site:
 
 def as_hosted(intersection: Intersection, folder: Path) -> None:
     """The network that SUMO as a host drives on."""
-    network.build_network(site_of(intersection), folder, host.sumo_home())
+    network.build_network(site_of(intersection), folder, network.sumo_home())
 
 
 def as_netconvert_draws_it(intersection: Intersection, folder: Path) -> None:
@@ -93,11 +93,11 @@ def as_netconvert_draws_it(intersection: Intersection, folder: Path) -> None:
     nodes = (line.split(" shape=")[0].rstrip("/>") + "/>" for line in network._nodes(intersection))
     network.write_xml(folder / network.NODES, "nodes", nodes)
     network.write_xml(folder / network.EDGES, "edges", network._edges(site_of(intersection)))
-    command = [str(host.sumo_home() / "bin" / "netconvert"), "--no-turnarounds", "true"]
+    command = [str(network.sumo_home() / "bin" / "netconvert"), "--no-turnarounds", "true"]
     command += ["--node-files", network.NODES, "--edge-files", network.EDGES]
     command += ["--output-file", network.NETWORK]
     command += ["--lefthand", str(intersection.side == "left").lower()]
-    network.run_tool(command, folder, host.sumo_home())
+    network.run_tool(command, folder, network.sumo_home())
 
 
 def oracle_of(intersection: Intersection, build: Callable[[Intersection, Path], None]) -> Oracle:

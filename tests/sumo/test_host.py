@@ -51,7 +51,7 @@ from minisim.errors import CollisionError, ControllerError, FileError, InputErro
 from minisim.junction.geometry import Intersection
 from minisim.results.driving import stops
 from minisim.results.run import Run
-from minisim.sumo import host, network, simulate
+from minisim.sumo import network, prepare, process, simulate, simulation
 from minisim.testing import check_controller, small_scenario
 from minisim.vehicle import VehicleType
 from scenarios import four_way
@@ -346,7 +346,7 @@ def test_any_geometry_becomes_the_same_network(intersection: Intersection) -> No
         made = network.build_network(
             Site(intersection, VehicleType(), 14.0, (0.0,) * intersection.n),
             Path(folder),
-            host.sumo_home(),
+            network.sumo_home(),
         )
         root = ET.parse(Path(folder) / network.NETWORK).getroot()
     arcs = [path.crossing for path in intersection.paths]
@@ -380,7 +380,7 @@ def test_what_netconvert_says_is_passed_on(monkeypatch: pytest.MonkeyPatch, tmp_
 
 
 def test_a_missing_program_is_told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(host, "sumo_home", lambda: tmp_path)
+    monkeypatch.setattr(simulation, "sumo_home", lambda: tmp_path)
     with pytest.raises(SumoError, match="cannot start netconvert: No such file"):
         simulate(single(), Unregulated())
 
@@ -396,7 +396,7 @@ def children(monkeypatch: pytest.MonkeyPatch, started: None) -> list[subprocess.
         started.append(child)
         return child
 
-    monkeypatch.setattr(host.subprocess, "Popen", starting)
+    monkeypatch.setattr(process.subprocess, "Popen", starting)
     return started
 
 
@@ -445,7 +445,7 @@ def test_a_broken_controller_is_told_as_in_minisim(
 
 
 def test_what_sumo_refuses_is_passed_on(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(host, "_command", lambda gui: ("sumo", "--no-such-option"))
+    monkeypatch.setattr(prepare, "_command", lambda gui: ("sumo", "--no-such-option"))
     with pytest.raises(SumoError, match=r"before the first step: .*no-such-option"):
         simulate(single(), Unregulated())
 

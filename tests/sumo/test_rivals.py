@@ -32,8 +32,7 @@ from minisim.junction.conflicts import conflicts
 from minisim.junction.geometry import Intersection
 from minisim.junction.movements import ARM_NAMES
 from minisim.junction.paths import Floats
-from minisim.sumo.host import sumo_home
-from minisim.sumo.network import run_tool, tag, write_xml
+from minisim.sumo.network import run_tool, sumo_home, tag, write_xml
 from minisim.vehicle import VehicleType
 from scenarios import four_way
 from scenarios.scenario import Scenario

@@ -15,8 +15,7 @@ from dim import Dim
 from minisim.demand import Demand
 from minisim.junction.roads import Road
 from minisim.sumo import simulate
-from minisim.sumo.host import sumo_home
-from minisim.sumo.network import run_tool
+from minisim.sumo.network import run_tool, sumo_home
 from minisim.town import read_junction, survey
 from scenarios import from_bearings
 from scenarios.profiles import FAIR

@@ -1,0 +1,88 @@
+"""What a session may command; a host carries it out in its next step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from minisim.control.view import Observed
+
+
+@dataclass(frozen=True, slots=True)
+class Go:
+    """Give one vehicle the right of way: its hold line no longer holds it."""
+
+    vehicle: int
+
+
+@dataclass(frozen=True, slots=True)
+class Reserve(Go):
+    """Give one vehicle the right of way from `time` on, as long as it keeps to a passage.
+
+    For sessions whose messages fail (`minisim.link`); a host by itself takes it for a `Go`. It is
+    void if it arrives later than `time`, and no `Hold` takes it back. Advice does not count from
+    `time` on. The vehicle gives the passage up by itself, and keeps to its last advice again, once
+    `keeps(vehicle, time)` is false, if it can still stop.
+    """
+
+    time: float  # [s]
+    keeps: Callable[[Observed, float], bool]
+
+
+@dataclass(frozen=True, slots=True)
+class Hold:
+    """Take away one vehicle's right of way: it stops at its hold line.
+
+    If it is too late for comfortable braking, the vehicle stops before the junction if its brakes
+    can; inside the junction, a hold has no effect.
+    """
+
+    vehicle: int
+
+
+@dataclass(frozen=True, slots=True)
+class Open:
+    """Give a whole lane the right of way (a green signal).
+
+    `amber` says that it is about to end. Only a `CruiseVehicle` that `obeys` heeds it.
+    """
+
+    lane: int
+    amber: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Close:
+    """Take a lane's right of way back; vehicles with a `Go` of their own keep theirs."""
+
+    lane: int
+
+
+@dataclass(frozen=True, slots=True)
+class Advise:
+    """Cap one vehicle's speed at `speed` [m/s] until advised again; infinity lifts the cap."""
+
+    vehicle: int
+    speed: float
+
+
+@dataclass(frozen=True, slots=True)
+class Brake:
+    """Make one vehicle brake at `deceleration` [m/s²] or harder until told otherwise; 0 lifts this.
+
+    It acts everywhere, even inside the junction, within what the brakes can do. A standing vehicle
+    stays put. It ends when the vehicle leaves the view for good: no session could lift it then.
+    """
+
+    vehicle: int
+    deceleration: float
+
+
+@dataclass(frozen=True, slots=True)
+class Wake:
+    """Wake the session at `time` [s] (once; a later `Wake` replaces an earlier one)."""
+
+    time: float
+
+
+Command = Go | Hold | Open | Close | Advise | Brake | Wake
