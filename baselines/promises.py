@@ -32,6 +32,9 @@ from minisim.channel import steps
 from minisim.control import Command, Observed, Report, Reserve, Site, View
 from minisim.ticks import time_of
 
+#: Advice that differs less is alike [m/s]: a round number of ours.
+ALIKE = 1.0
+
 
 class _Said(NamedTuple):
     """What a vehicle was told."""
@@ -119,8 +122,13 @@ class Promises(Passages):
         return Reserve(vehicle, time_of(effect, dt), keeps)
 
     def advise(self, vehicle: int, speed: float) -> Iterator[Command]:
-        """Advise a vehicle a speed [m/s], unless it may hold or has not said that it follows."""
+        """Advise a vehicle a speed [m/s], unless it may hold or has not said that it follows.
+
+        Less than `ALIKE` from the advice before is no news: it would only delay a promise.
+        """
         report = self._reports[vehicle]
+        if math.isclose(speed, self._told[vehicle].advice, rel_tol=0.0, abs_tol=ALIKE):
+            return
         if report.follows and not report.holds and vehicle not in self.manager.slots:
             self._told[vehicle] = self._told[vehicle]._replace(advice=speed)
             yield from super().advise(vehicle, speed)
