@@ -28,12 +28,9 @@ from collections.abc import Iterator
 from baselines.manager import Manager
 from baselines.passages import PassageSession
 from baselines.promises import passages_of
-from minisim.control import Command, Cover, Plan, Radio, Site, stopping_distance
+from minisim.control import AT_LINE, Command, Cover, Plan, Radio, Site, stopping_distance
 from minisim.names import Name
 from minisim.parameters import declared, real
-
-#: A held vehicle stands up to this far before its line [m], so no vehicle may ask any later.
-STANDS_BEFORE = 1.0
 
 
 @declared
@@ -74,7 +71,8 @@ class ReservationSession(PassageSession):
         reach, period, buffer = controller.reach, controller.period, controller.buffer
         if reach is None:
             braking = stopping_distance(site.speed_limit, site.vehicle.deceleration)
-            reach = max(braking + period * site.speed_limit, STANDS_BEFORE)
+            # A vehicle that stands at its line must have asked.
+            reach = max(braking + period * site.speed_limit, AT_LINE)
             if site.channel:  # a request and its answer take longer
                 late = 2.0 * site.channel.slowest + controller.radio.interval
                 reach += late * site.speed_limit
