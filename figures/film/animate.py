@@ -1,4 +1,4 @@
-"""Animations of a run: GIF, MP4 or a web page that plays by itself.
+"""Animations of a run: GIF, MP4, or matplotlib's own.
 
 The still ground is drawn once. Each frame restores it and draws only what moves, which takes a few
 milliseconds; drawing a full figure takes fifty.
@@ -42,15 +42,13 @@ FOOT = 1.02
 BAND = 0.28
 #: An entry of the legend: colour, words, shape.
 Key = tuple[str, str, str]
-#: What the zones mean, for the legend.
-MEANINGS = {"red": ": slow", "yellow": ": decide", "green": ": buffer"}
 
 
 def write_animation(
     run: Run, path: str | os.PathLike[str], *, start: float = 0.0, seconds: float = 60.0,
     fps: float = 10.0, progress: Callable[[int, int], None] | None = None,
 ) -> None:  # fmt: skip
-    """Write `seconds` of a run as an animation in the format of the file's suffix.
+    """Write `seconds` of a run as a .gif or .mp4; see `play` for a page.
 
     What was not recorded is run again (`figures.whole` says what that costs). There are `fps`
     frames per second, at most one per step, and 50 in a GIF; `progress` gets frames done and the
@@ -76,10 +74,8 @@ def write_animation(
     with replacing(path) as part:
         if kind == "gif":
             encode.write_gif(frames(), picture.palette(), part, fps)
-        elif kind == "mp4":
-            encode.write_mp4(frames(), part, fps)
         else:
-            encode.write_html(frames(), picture.palette(), part, fps, picture.title)
+            encode.write_mp4(frames(), part, fps)
 
 
 class Film(FuncAnimation):
@@ -210,7 +206,7 @@ class Picture:
             lines += [(style.RIGHT_OF_WAY, "hold line: the first may go", "line"),
                       (style.INK, "holds", "line")]  # fmt: skip
         rows = [self._vehicle_keys(), lines, [
-            (style.ZONES.get(name, style.SKY), words + MEANINGS.get(name, ""), "area")
+            (style.ZONES.get(name, style.SKY), words + drawing.MEANINGS.get(name, ""), "area")
             for name, words in drawing.zone_words(self.run.plan).items()
         ]]  # fmt: skip
         rows = [row for row in rows if row]

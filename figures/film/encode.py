@@ -1,13 +1,10 @@
-"""Frames into files: GIF, MP4 and a web page that plays by itself.
+"""Frames into files: GIF and MP4.
 
 Frames are images of one size that arrive one by one; only the previous one is kept in memory.
 """
 
 from __future__ import annotations
 
-import base64
-import html
-import io
 import shutil
 import struct
 import subprocess
@@ -26,7 +23,7 @@ from figures.style import suffix_of
 from minisim.errors import FileError, MissingExtraError
 from minisim.files import AnyPath
 
-FORMATS = ("gif", "mp4", "html")
+FORMATS = ("gif", "mp4")
 
 Indices = npt.NDArray[np.uint8]
 
@@ -42,7 +39,7 @@ def animation_format(path: AnyPath) -> str:
     suffix = suffix_of(path, "an animation", FORMATS)
     if suffix == "mp4" and shutil.which("ffmpeg") is None:
         lacking = "an .mp4 needs the program ffmpeg, which was not found"
-        raise MissingExtraError(f"{lacking}; install it, or write a .gif or .html")
+        raise MissingExtraError(f"{lacking}; install it, or write a .gif or a page (.html)")
     return suffix
 
 
@@ -95,29 +92,6 @@ def write_mp4(frames: Iterator[Image], path: Path, fps: float) -> None:
             raise FileError(f"ffmpeg could not write the animation: {reason}")
 
 
-def write_html(frames: Iterator[Image], palette: Image, path: Path, fps: float, title: str) -> None:
-    """Write a web page that needs no other file: a player with the frames inside.
-
-    Each frame holds only its differences from the first one. So the page stays small, and each
-    frame can be shown without the ones before it.
-    """
-    template = Path(__file__).with_name("player.html").read_text(encoding="utf-8")
-    width, height = map(str, palette.size)
-    fields = {"title": html.escape(title), "fps": f"{fps:g}", "width": width, "height": height}
-    for name, value in fields.items():
-        template = template.replace(f"{{{{{name}}}}}", value)
-    before, after = template.split("{{frames}}")
-    ground: Indices | None = None
-    with path.open("w", encoding="utf-8") as file:
-        file.write(before)
-        for frame in frames:
-            indices = _indexed(frame, palette)
-            (x, y), part = _changed(indices, ground)
-            ground = indices if ground is None else ground
-            file.write(f'[{x}, {y}, "{_png(part, palette)}"],\n')
-        file.write(after)
-
-
 def _indexed(frame: Image, palette: Image) -> Indices:
     return np.asarray(frame.quantize(palette=palette, dither=Dither.NONE))
 
@@ -125,15 +99,6 @@ def _indexed(frame: Image, palette: Image) -> Indices:
 def _colours(palette: Image) -> bytes:
     """Red, green and blue of every index, including the transparent one."""
     return bytes(palette.getpalette() or ())[: 3 * COLOURS].ljust(3 * (COLOURS + 1), b"\0")
-
-
-def _png(indices: Indices, palette: Image) -> str:
-    """A PNG as base64 text; the index `COLOURS` is transparent."""
-    picture = fromarray(indices, "P")
-    picture.putpalette(_colours(palette))
-    buffer = io.BytesIO()
-    picture.save(buffer, format="PNG", transparency=COLOURS)
-    return base64.b64encode(buffer.getvalue()).decode("ascii")
 
 
 def _changed(indices: Indices, shown: Indices | None) -> tuple[tuple[int, int], Indices]:

@@ -25,6 +25,8 @@ from minisim.vehicle import VehicleType
 
 #: Length of an arrowhead [pt].
 HEAD = 8.0
+#: What zones are for, to follow their names in a legend.
+MEANINGS = {"red": ": slow", "yellow": ": decide", "green": ": buffer"}
 #: Number of points on the kerb between two arms.
 KERB_POINTS = 24
 
@@ -80,17 +82,24 @@ def draw_junction(axes: Axes, intersection: Intersection, plan: Plan, reach: flo
         if i in every:
             entry = lane_strip(intersection, i, 0.15, -0.15)
             axes.add_patch(Polygon(entry, facecolor=style.PAINT, linewidth=0, zorder=3))
-    for arm, half in zip(intersection.arms, intersection.half_widths, strict=True):
-        ahead, clockwise = _axes_of(arm)  # their names, beside the approach lanes
-        beside = clockwise * _keep(intersection) * (half + 0.055 * reach)
-        edge = 0.93 * reach - np.abs(beside)
-        along = min(edge[k] / abs(ahead[k]) for k in (0, 1) if abs(ahead[k]) > 1e-9)
-        x, y = ahead * along + beside
+    for arm, (x, y) in zip(intersection.arms, name_places(intersection, reach), strict=True):
         axes.text(
             x, y, arm.name, ha="center", va="center", fontsize=13, fontweight="bold",
             color=style.PAPER, zorder=9,
             bbox={"boxstyle": "circle,pad=0.28", "facecolor": style.INK, "linewidth": 0},
         )  # fmt: skip
+
+
+def name_places(intersection: Intersection, reach: float) -> list[Floats]:
+    """Where the names of the arms stand, beside their approach lanes, each (2,) [m]."""
+    places = []
+    for arm, half in zip(intersection.arms, intersection.half_widths, strict=True):
+        ahead, clockwise = _axes_of(arm)
+        beside = clockwise * _keep(intersection) * (half + 0.055 * reach)
+        edge = 0.93 * reach - np.abs(beside)
+        along = min(edge[k] / abs(ahead[k]) for k in (0, 1) if abs(ahead[k]) > 1e-9)
+        places.append(ahead * along + beside)
+    return places
 
 
 def zone_words(plan: Plan) -> dict[str, str]:

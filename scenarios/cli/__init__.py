@@ -26,7 +26,7 @@ __all__ = ["COMMANDS", "app", "main"]
 
 #: The help lists these first, then the others by name.
 _FIRST = (
-    "demo", "run", "controllers", "animate", "sweep", "figures", "reproduce", "benchmark",
+    "demo", "run", "controllers", "animate", "lab", "sweep", "figures", "reproduce", "benchmark",
     "crossval",
 )  # fmt: skip
 

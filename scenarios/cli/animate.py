@@ -2,29 +2,29 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from minisim.errors import number
+from minisim.errors import InputError, number
 from scenarios.cli.shared import options
 from scenarios.cli.shared.app import app
 from scenarios.cli.shared.simulate import simulate
 from scenarios.cli.shared.terminal import bar
 
+#: What matplotlib draws, frame by frame.
+FILMS = ("gif", "mp4")
+
 
 @app.command(
     epilog="[bold]Example[/bold]\n\n"
-    "minisim animate five-way -c fixed-time -d 300 --from 600 --seconds 120 -o signal.html"
+    "minisim animate five-way -c fixed-time -d 300 --from 600 --seconds 120 -o signal.html\n\n"
+    "minisim animate four-way -c dim --beside fixed-time -o two.html"
 )
 def animate(
     scenario: options.ScenarioName,
-    out: Annotated[
-        Path,
-        options.option("What to write: .gif, .mp4 (needs ffmpeg) or .html (a page with a player).",
-                       "FILE", "--out", "-o"),
-    ],
     controller: options.ControllerName = "dim",
     humans: options.Humans = 0.0,
     latency: options.Latency = 0.0,
@@ -32,7 +32,18 @@ def animate(
     loss: options.Loss = 0.0,
     begin: Annotated[float, typer.Option("--from", metavar="S", help="When to begin.")] = 300.0,
     seconds: Annotated[float, typer.Option(metavar="S", help="Simulated time to show.")] = 60.0,
-    fps: Annotated[float, typer.Option(help="At most one per step, and 50 in a .gif.")] = 10.0,
+    out: Annotated[
+        Path,
+        options.option("What to write: .html (a page with a player; film.html by default), .gif, "
+                       ".mp4 (needs ffmpeg) or .json (a scene).", "FILE", "--out", "-o"),
+    ] = Path("film.html"),
+    beside: Annotated[
+        str | None, options.option("A second controller beside it, in a page.", "SPEC")
+    ] = None,
+    fps: Annotated[
+        float | None,
+        options.option("Of a .gif or .mp4, 10 by default: at most one per step, and 50 in a .gif."),
+    ] = None,
     density: options.Density = None,
     split: options.Split = None,
     turns: options.Turns = None,
@@ -45,32 +56,55 @@ def animate(
     lane_width: options.LaneWidth = None,
     seed: options.Seed = 0,
     horizon: options.Horizon = None,
+    demand_time: options.DemandTime = None,
     arrivals: options.Arrivals = None,
     demand: options.DemandFile = None,
     start: options.Start = None,
 ) -> None:  # fmt: skip
-    """Write an animation of a run: which vehicles wait, have right of way, and cross."""
+    """Show a run: a page that says why each vehicle waits, or an animation."""
     from figures.film.animate import frame_times, write_animation
     from figures.film.encode import animation_format
+    from figures.player.page import play
+    from figures.player.scene import scene as scene_of
+    from figures.player.scene import write_scene
+    from figures.style import suffix_of
     from minisim.files import check_apart, check_file
     from scenarios.controllers import controller_named
     from scenarios.recipe import Recipe
 
     check_apart({"--arrivals": arrivals, "--demand": demand, "--out": out})
-    animation_format(out)
+    kind = suffix_of(out, "an animation", ("html", "gif", "mp4", "json"))
+    film = kind in FILMS
+    if film:
+        animation_format(out)
+    elif fps is not None:
+        raise InputError(f"--fps is for a .gif or .mp4; a .{kind} has every step")
+    if beside is not None and kind != "html":
+        raise InputError(f"--beside is for a .html, which plays two runs; got {str(out)!r}")
     check_file(out)
     junction = options.build_scenario(
         scenario, bearings, arrivals, start, demand, density=density, split=split, turns=turns,
-        unit=unit, fleet=fleet, lane_width=lane_width,
-        profile=profile, side=side, node=node, horizon=horizon,
+        unit=unit, fleet=fleet, lane_width=lane_width, profile=profile, side=side, node=node,
+        horizon=horizon, demand_time=demand_time,
     )  # fmt: skip
     number("--from [s]", begin, low=0, below=junction.horizon)
     number("--seconds", seconds, above=0, high=min(3600.0, junction.horizon - begin))
-    frame_times(begin, seconds, fps, junction.profile.dt)
-    who = controller_named(controller, profile)
-    recipe = Recipe(junction, who, seed, humans, latency, jitter, loss, on_collision="record")
+    rate = 10.0 if fps is None else fps
+    if film:
+        frame_times(begin, seconds, rate, junction.profile.dt)
+    recipes = [
+        Recipe(junction, controller_named(name, profile), seed, humans, latency, jitter, loss,
+               on_collision="record")
+        for name in (controller, beside) if name is not None
+    ]  # fmt: skip
     end = begin + seconds
-    result = recipe.run(simulate, until=end, record="all", record_window=(begin, end))
+    recording = {"record": "all", "record_window": (begin, math.inf), "explain": not film}
+    runs = [recipe.run(simulate, until=end, **recording) for recipe in recipes]
     with bar("drawing") as progress:
-        write_animation(result, out, start=begin, seconds=seconds, fps=fps, progress=progress)
+        if film:
+            write_animation(runs[0], out, start=begin, seconds=seconds, fps=rate, progress=progress)
+        elif kind == "html":
+            play(*runs, start=begin, seconds=seconds).save(out)
+        else:
+            write_scene(scene_of(runs[0], start=begin, seconds=seconds), out)
     typer.echo(f"wrote {out}")

@@ -27,7 +27,7 @@ def _version(wanted: bool) -> None:
 
 #: These commands simulate in any case.
 _SIMULATING = (
-    "animate", "benchmark", "crossval", "demo", "optimum", "reproduce", "run", "sweep",
+    "animate", "benchmark", "crossval", "demo", "lab", "optimum", "reproduce", "run", "sweep",
 )  # fmt: skip
 
 

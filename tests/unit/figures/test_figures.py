@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import base64
-import io
-import json
 import math
-import re
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import combinations, product
@@ -26,7 +22,7 @@ from baselines import FixedTime
 from dim import Dim, HarmonyMatrix, explain
 from figures import animation, decision, performance_figure, style, write_animation
 from figures.film.animate import Picture, frame_times
-from figures.film.encode import COLOURS, palette_of, write_gif, write_html
+from figures.film.encode import COLOURS, palette_of, write_gif
 from figures.film.frames import RELEASED, Frames
 from figures.junction import drawing
 from figures.whole import filmed, head_spans
@@ -396,31 +392,6 @@ def test_the_header_tells_recorded_arrivals_from_a_demand(run: Run) -> None:
     assert "2 recorded arrivals" in recorded
     assert "veh/h" not in recorded
     assert "400 veh/h/lane" in written(run)
-
-
-def test_html_holds_every_frame(tmp_path: Path) -> None:
-    rng = np.random.default_rng(1)
-    pictures = (rng.integers(0, 4, (4, 5, 6, 3)) * 85).astype(np.uint8)
-    frames = [Image.fromarray(picture) for picture in pictures]
-    palette = palette_of(Image.fromarray(np.concatenate([np.asarray(f) for f in frames])))
-    palette = palette.crop((0, 0, 6, 5))
-    file = tmp_path / "film.html"
-    write_html(iter(frames), palette, file, 5.0, 'four-way <b> "x"')
-    page = file.read_text()
-    assert "{{" not in page
-    assert "four-way &lt;b&gt;" in page
-    assert "<b>" not in page
-    (listed,) = re.findall(r"const frames = (\[.*?\n  \]);", page, re.DOTALL)
-    parts = json.loads(re.sub(r",\s*\]", "]", listed))
-    assert len(parts) == len(frames)
-    shown = Image.new("RGBA", (6, 5))
-    ground = None
-    for (x, y, data), frame in zip(parts, indexed(frames, palette), strict=True):
-        part = Image.open(io.BytesIO(base64.b64decode(data))).convert("RGBA")
-        shown = Image.new("RGBA", (6, 5)) if ground is None else ground.copy()
-        shown.alpha_composite(part, (x, y))
-        ground = shown if ground is None else ground
-        assert (pixels(shown.convert("RGB")) == pixels(frame)).all()
 
 
 def test_palette_leaves_an_index_free() -> None:

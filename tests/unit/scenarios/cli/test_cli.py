@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import contextlib
+import importlib
 import importlib.util
+import inspect
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -21,6 +24,7 @@ from PIL import Image
 
 import minisim.simulation
 from dim import HarmonyMatrix
+from figures import read_scene
 from minisim.errors import InputError
 from minisim.recorded import write_arrivals
 from minisim.results.metrics import METRICS, SAFETY
@@ -480,11 +484,43 @@ def test_a_film_shows_the_run_of_the_same_options(
         pd.testing.assert_frame_equal(film[over], whole[: len(film)][over], check_dtype=False)
 
 
+def test_animate_plays_two_runs_of_the_same_arrivals(capsys: Captured, tmp_path: Path) -> None:
+    page, file = tmp_path / "two.html", tmp_path / "one.json"
+    what = ("animate", "four-way", "-d", "300", "--seed", "3", "--from", "40", "--seconds", "10")
+    assert ok(capsys, *what, "--beside", "fixed-time", "-o", str(page)) == f"wrote {page}\n"
+    ok(capsys, *what, "-o", str(file))
+    (held,) = re.findall(r'"application/json">(.*?)</script>', page.read_text(encoding="utf-8"))
+    one, other = json.loads(held)
+    assert one == read_scene(file)
+    assert [it["controller"] for it in (one, other)] == ["dim", "fixed-time"]
+    assert one["reasons"]
+    assert one["start"] == 40.0
+
+
+#: Options of `run` that change no traffic: what is measured, written, or done in SUMO.
+OF_RUN_ALONE = {
+    "warmup", "on_collision", "no_safety", "metrics", "by", "as_json", "trips", "trajectories",
+    "fcd", "host", "sumo_model", "gui", "keep_files", "sumo_fcd",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("command", ["animate", "why"])
+def test_every_option_that_changes_the_traffic_is_there(command: str) -> None:
+    """`run`, `animate` and `why` show the same run, with the same types and defaults."""
+    of_run, of_other = (
+        inspect.signature(getattr(importlib.import_module(f"scenarios.cli.{it}"), it)).parameters
+        for it in ("run", command)
+    )
+    assert of_run.keys() - of_other.keys() <= OF_RUN_ALONE
+    for name in of_run.keys() & of_other.keys() - OF_RUN_ALONE:
+        assert of_run[name] == of_other[name]
+
+
 def test_animate_checks(capsys: Captured, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("minisim.simulation.Simulation", None)  # would be a TypeError
     monkeypatch.setenv("PATH", here := str(tmp_path))
     for file, more, said in (
-        ("film.avi", (), ".gif, .mp4, .html"), ("film.mp4", (), "ffmpeg"),
+        ("film.avi", (), ".html, .gif, .mp4, .json"), ("film.mp4", (), "ffmpeg"),
         ("no/film.gif", (), f"no folder {here}/no"), ("f.gif", ("--fps", "11"), "fps"),
         ("f.gif", ("--from", "280", "--horizon", "300"), "--seconds must be"),
         ("f.gif", ("--from", "280", "--horizon", "200"), "--from [s] must be"),
@@ -542,7 +578,9 @@ BAD = [
     (("harmony", "four-way", "--csv", "--json"), "--json"),
     (("decide", "four-way", "a1", "--order", "sise"), "did you mean 'size'"),
     (("decide", "four-way", "a1", "--plot", "p.bmp"), ".png, .pdf, .svg"),
-    (("animate", "four-way"), "--out"),
+    (("animate", "four-way", "-o", "x.json", "--fps", "5"), "--fps is for a .gif or .mp4"),
+    (("animate", "four-way", "-o", "x.gif", "--beside", "dim"), "--beside is for a .html"),
+    (("animate", "four-way", "--beside", "dum"), "did you mean 'dim'"),
     (("run", "four-way", "--metrics", "pets,trips", "--no-safety"), "asks for pets, which --no"),
     (("run", "four-way", "--metrics", "own_none:delay"), "there is no own_none.py"),
     (("run", "four-way", "--by", "lan"), "did you mean 'lane'?"),

@@ -1,0 +1,1 @@
+"""The player: a run as a scene, and the web page that plays it."""
