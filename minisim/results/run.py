@@ -31,7 +31,7 @@ from minisim.version import __version__
 if TYPE_CHECKING:
     import pandas as pd
 
-    from minisim.results.safety import Encounters
+    from minisim.results.encounters import Encounters
     from minisim.results.why import Account
 
 
@@ -145,7 +145,7 @@ class Run:
     @cached_property
     def encounters(self) -> Encounters:
         """Each encounter of two vehicles in and near the junction; `InputError` if not recorded."""
-        from minisim.results.safety import encounters_of
+        from minisim.results.encounters import encounters_of
 
         return encounters_of(self)
 
