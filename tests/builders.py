@@ -541,7 +541,7 @@ def frame_of(*rows: dict[str, Any]) -> pd.DataFrame:
     return pd.DataFrame(list(rows), columns=list(TRAJECTORY_COLUMNS))
 
 
-def drive(vehicle: int, movement: str, start: float, v: float) -> list[dict[str, Any]]:
+def glide(vehicle: int, movement: str, start: float, v: float) -> list[dict[str, Any]]:
     """A vehicle at constant speed whose front passes the entry at `start`; a row per 0.1 s."""
     times = np.arange(round(start * 10) - 60, round(start * 10) + 60) / 10.0
     return [at(vehicle, movement, v * (t - start), v, time=t) for t in times.tolist()]

@@ -16,7 +16,7 @@ from minisim.junction.partings import branch
 from minisim.results.encounters import crossings, encroachments, following
 from minisim.results.safety import safety_summary
 from minisim.testing import small_scenario
-from tests.builders import at, drive, frame_of
+from tests.builders import at, frame_of, glide
 
 SITE = small_scenario(4).site(0)
 ENTRY = SITE.intersection.approach_length
@@ -102,7 +102,7 @@ def test_past_the_junction_each_still_follows_only_once() -> None:
 @pytest.mark.parametrize(("headway", "pet"), [(3.0, 2.0), (1.5, 0.5), (0.8, -0.2)])
 def test_pet_of_two_crossing_vehicles(headway: float, pet: float) -> None:
     # At 10 m/s a2 leaves the area 1.47 s after its entry, b2 enters it 0.47 s after its own.
-    frame = frame_of(*drive(1, "a2", 10.0, 10.0), *drive(2, "b2", 10.0 + headway, 10.0))
+    frame = frame_of(*glide(1, "a2", 10.0, 10.0), *glide(2, "b2", 10.0 + headway, 10.0))
     (row,) = encroachments(frame, SITE).to_dict("records")
     assert (row["first"], row["second"]) == (1, 2)
     assert row["time_s"] == pytest.approx(10.0 + headway + 0.47, abs=0.01)
@@ -114,7 +114,7 @@ def test_pet_of_two_crossing_vehicles(headway: float, pet: float) -> None:
 
 def test_pet_of_merging_vehicles_ends_when_the_first_is_clear() -> None:
     # d2 is clear (rear past the exit) after 14.4 + 5 m; then a1 begins.
-    frame = frame_of(*drive(1, "d2", 10.0, 10.0), *drive(2, "a1", 13.0, 5.0))
+    frame = frame_of(*glide(1, "d2", 10.0, 10.0), *glide(2, "a1", 13.0, 5.0))
     (row,) = encroachments(frame, SITE).to_dict("records")
     areas = conflict_areas(SITE.intersection, SITE.vehicle)
     enter = areas.enter[0, SITE.intersection.index("d2")] - ENTRY
@@ -123,8 +123,8 @@ def test_pet_of_merging_vehicles_ends_when_the_first_is_clear() -> None:
 
 def test_only_the_next_vehicle_through_the_area_encroaches() -> None:
     frame = frame_of(
-        *drive(1, "a2", 10.0, 10.0), *drive(2, "a2", 12.0, 10.0), *drive(3, "b2", 15.0, 10.0),
-        *drive(4, "b2", 17.0, 10.0), *drive(5, "a2", 20.0, 10.0),
+        *glide(1, "a2", 10.0, 10.0), *glide(2, "a2", 12.0, 10.0), *glide(3, "b2", 15.0, 10.0),
+        *glide(4, "b2", 17.0, 10.0), *glide(5, "a2", 20.0, 10.0),
     )  # fmt: skip
     pairs = encroachments(frame, SITE)[["first", "second"]].to_numpy().tolist()
     assert pairs == [[2, 3], [4, 5]]
@@ -132,7 +132,7 @@ def test_only_the_next_vehicle_through_the_area_encroaches() -> None:
 
 def test_harmonious_vehicles_do_not_encroach() -> None:
     # a1 and c1 turn left, each into its own exit.
-    frame = frame_of(*drive(1, "a1", 10.0, 5.0), *drive(2, "c1", 10.5, 5.0))
+    frame = frame_of(*glide(1, "a1", 10.0, 5.0), *glide(2, "c1", 10.5, 5.0))
     assert len(encroachments(frame, SITE)) == 0
     assert safety_summary(frame, SITE)["min_pet_s"] is None
 
@@ -140,15 +140,15 @@ def test_harmonious_vehicles_do_not_encroach() -> None:
 def test_a_vehicle_that_stays_in_the_area_leaves_it_at_the_end_of_its_recording() -> None:
     stuck = [at(1, "a2", 9.0, 0.0, time=t / 10.0) for t in range(100, 200)]
     arriving = [at(1, "a2", t - 101.0, 10.0, time=(t - 11) / 10.0) for t in range(90, 111)]
-    frame = frame_of(*arriving, *stuck, *drive(2, "b2", 15.0, 10.0))
+    frame = frame_of(*arriving, *stuck, *glide(2, "b2", 15.0, 10.0))
     (row,) = encroachments(frame, SITE).to_dict("records")
     # b2 enters at 15.47 s; a2 is last seen, inside, at 19.9 s.
     assert row["pet_s"] == pytest.approx(15.47 - 19.9, abs=0.02)
 
 
 def test_a_vehicle_whose_entry_is_not_recorded_does_not_count() -> None:
-    late = [row for row in drive(1, "a2", 10.0, 10.0) if row["time_s"] > 11.0]
-    frame = frame_of(*late, *drive(2, "b2", 13.0, 10.0))
+    late = [row for row in glide(1, "a2", 10.0, 10.0) if row["time_s"] > 11.0]
+    frame = frame_of(*late, *glide(2, "b2", 13.0, 10.0))
     assert len(encroachments(frame, SITE)) == 0
 
 

@@ -15,7 +15,7 @@ from minisim.results.encounters import crossings, encroachments, following
 from minisim.results.safety import high_drac, safety_summary, short_pet, short_ttc
 from minisim.testing import small_scenario
 from scenarios import four_way
-from tests.builders import at, drive, driven, frame_of, replayed
+from tests.builders import at, driven, frame_of, glide, replayed
 
 SITE = small_scenario(4).site(0)
 NOTHING = {
@@ -61,9 +61,9 @@ def test_nothing_happens_on_an_empty_recording() -> None:
 
 def test_the_order_of_the_rows_does_not_matter() -> None:
     rows = [
-        *drive(1, "a2", 10.0, 10.0),
-        *drive(2, "b2", 11.0, 10.0),
-        *drive(3, "a1", 14.0, 8.0),
+        *glide(1, "a2", 10.0, 10.0),
+        *glide(2, "b2", 11.0, 10.0),
+        *glide(3, "a1", 14.0, 8.0),
     ]
     frame = frame_of(*rows)
     shuffled = frame.sample(frac=1.0, random_state=0)
