@@ -20,7 +20,7 @@ from minisim.errors import InputError
 from minisim.junction.movements import ARM_NAMES
 from minisim.names import name_of
 from minisim.reasons import Reason, Shown, Told
-from minisim.results.metrics import Asked
+from minisim.results.asked import Asked
 from minisim.results.summary import summarise, trip_table
 from minisim.results.tracks import Tracks, tracks_of
 from minisim.results.trajectories import TRAJECTORY_COLUMNS, TYPE

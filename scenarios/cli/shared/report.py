@@ -12,8 +12,9 @@ from rich.text import Text
 from minisim.clock import time_of_day
 from minisim.errors import plural
 from minisim.junction.movements import ARM_NAMES
+from minisim.results.asked import asked_metrics
 from minisim.results.metric import GROUPS, SPREAD, Metric
-from minisim.results.metrics import METRICS, asked_metrics, heading
+from minisim.results.metrics import METRICS, heading
 from minisim.results.show import conditions, spilled
 from scenarios.statistics import FILLING, Interval
 from scenarios.sweep.cells import SUMS
