@@ -5,10 +5,11 @@ Shrivastava, DAC 2017). Until then the vehicle counts as held, so its passage is
 manager last heard of it a while ago. If the message gets lost, the vehicle says later that it holds
 nothing. Only then is its passage free again: until then, the message may have been heard.
 
-Each promise that a vehicle did not hear lets the next one take effect a period later, so the link
-can repeat it more often. With `n` repetitions a period, the k-th promise is lost with the
-probability loss^(1 + n (k - 1)). So the number of promises needs no limit: it is finite at every
-loss below 1, and at a loss of 1 no vehicle is ever heard of.
+Each promise that a vehicle did not hear lets its next one take effect a period later, so the link
+can repeat it more often. The first promise to another vehicle begins with what the last one that
+was heard took, less a period. With `n` repetitions a period, the k-th promise to a vehicle is lost
+with a probability of at most loss^(1 + n (k - 1)). So the number of promises needs no limit: it is
+finite at every loss below 1, and at a loss of 1 no vehicle is ever heard of.
 
 A vehicle keeps to its passage within half the `buffer`, or gives it up while it can stop, as the
 vehicles of Dresner and Stone cancel. So two in conflict stay out of each other's zones, and a
@@ -40,7 +41,8 @@ class _Said(NamedTuple):
     """What a vehicle was told."""
 
     effect: int = -1  # when its last promise takes effect [steps]
-    unheard: int = 0  # how many promises it did not hear, or gave up
+    late: int | None = None  # so many periods later than it could; None before the first promise
+    heard: bool = False  # whether it has heard that promise
     advice: float = math.inf  # [m/s]
 
 
@@ -53,6 +55,7 @@ class Promises(Passages):
         self._exits = [path.exit_arm for path in site.intersection.paths]
         self._wait = steps(site.channel.slowest, site.dt)
         self._longer = steps(period, site.dt)
+        self._late = 0  # how many periods later the first promise to a vehicle takes effect
         self._slack = buffer / 2.0 / site.dt
         self._reports: Mapping[int, Report] = {}
         self._told: dict[int, _Said] = {}
@@ -80,10 +83,24 @@ class Promises(Passages):
                 continue
             if not self._reports[vehicle].holds:
                 del slots[vehicle]
-                self._told[vehicle] = told._replace(unheard=told.unheard + 1)
-            elif leader is None or leader in self._sure:
+                self._note(vehicle, heard=False)
+                continue
+            if not told.heard:
+                self._note(vehicle, heard=True)
+            if leader is None or leader in self._sure:
                 self._sure.add(vehicle)
         yield from ()
+
+    def _note(self, vehicle: int, *, heard: bool) -> None:
+        """Let promises take effect earlier if one was heard, or else later."""
+        told = self._told[vehicle]
+        late = told.late or 0
+        if heard:
+            self._late = max(late - 1, 0)
+        else:
+            late += 1
+            self._late = max(self._late, late)
+        self._told[vehicle] = told._replace(late=late, heard=heard)
 
     def ask(self, vehicle: int) -> Slot | None:
         """A vehicle's passage from when a promise takes effect; None if it cannot be sure."""
@@ -111,7 +128,8 @@ class Promises(Passages):
         vehicle, dt, slack = slot.vehicle, self._dt, self._slack
         effect, last = self._effect(vehicle), len(slot.s) - 1
         self.manager.slots[vehicle] = slot
-        self._told[vehicle] = self._told[vehicle]._replace(effect=effect)
+        told = self._told[vehicle]
+        self._told[vehicle] = told._replace(effect=effect, late=self._periods(vehicle))
 
         def keeps(me: Observed, time: float) -> bool:
             now = time / dt - slot.start
@@ -135,7 +153,12 @@ class Promises(Passages):
 
     def _effect(self, vehicle: int) -> int:
         """When a promise that is made now takes effect [steps]."""
-        return self.now + self._wait + self._told[vehicle].unheard * self._longer
+        return self.now + self._wait + self._longer * self._periods(vehicle)
+
+    def _periods(self, vehicle: int) -> int:
+        """How many periods later than it could a promise to a vehicle takes effect."""
+        late = self._told[vehicle].late
+        return self._late if late is None else late
 
     def _meets(self, me: Observed, slot: Slot) -> bool:
         """Whether a vehicle leaves by the same lane as a holder, or comes from the same one."""

@@ -100,7 +100,7 @@ def test_a_passage_is_free_again_only_when_its_vehicle_says_so() -> None:
     assert answered(run, 0.0, foe) == [(1, pytest.approx(0.2))]
     assert answered(run, 0.2, foe, other) == []  # it may still get the message
     assert answered(run, 0.5, foe, other, said=0.2) == []
-    assert answered(run, 0.5, foe, other, said=0.3) == [(2, pytest.approx(0.7))]
+    assert answered(run, 0.5, foe, other, said=0.3) == [(2, pytest.approx(1.2))]  # a period later
     assert {*run.manager.slots} == {2}
 
 
@@ -153,6 +153,16 @@ def test_each_promise_that_was_not_heard_lets_the_next_take_effect_a_period_late
     run, me = Reservation(period=0.5).start(LATE), car(1, 0, 2, 40.0, speed=0.0)
     effects = [answered(run, now, me)[0][1] - now for now in (0.0, 1.0, 3.0)]
     assert effects == pytest.approx([0.2, 0.7, 1.2])
+
+
+def test_the_first_promise_to_another_vehicle_begins_where_the_last_one_succeeded() -> None:
+    """After two that were not heard, it takes effect two periods later, and one once it was."""
+    run, me = Reservation(period=0.5).start(LATE), car(1, 0, 2, 40.0, speed=0.0)
+    for now in (0.0, 1.0, 3.0):
+        answered(run, now, me)
+    friend, later = car(2, 2, 2, 40.0, speed=0.0), car(3, 2, 2, 60.0, speed=0.0)
+    assert answered(run, 3.0, me, friend) == [(2, pytest.approx(3.0 + 0.2 + 2 * 0.5))]
+    assert answered(run, 5.0, me, friend, later, holding=(1, 2)) == [(3, pytest.approx(5.7))]
 
 
 def test_a_promise_waits_until_its_vehicle_follows_the_advice_before() -> None:
