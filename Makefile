@@ -78,7 +78,7 @@ $(VENV)/.installed-dev: $(VENV)/.installed
 	@touch $@
 
 $(VENV)/.installed-all: $(VENV)/.installed-dev
-	$(PIP) -e '.[dev,sumo,dask,docs]'
+	$(PIP) -e '.[dev,sumo,dask,docs,notebook]'
 	@touch $@
 
 $(VENV)/.installed-mutants: $(VENV)/.installed-all

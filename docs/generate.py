@@ -14,7 +14,7 @@ from scenarios.controllers import CONTROLLERS, maker_of
 PACKAGES = (
     "minisim", "dim", "baselines", "scenarios", "figures",
     "minisim.control", "minisim.counts", "minisim.town", "minisim.sumo",
-    "scenarios.crossval", "scenarios.sweep",
+    "scenarios.crossval", "scenarios.environments", "scenarios.sweep",
 )  # fmt: skip
 
 

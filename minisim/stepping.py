@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator
 from typing import Self
 
+from minisim.arrivals import Arrivals
 from minisim.control import Command, View
 from minisim.engine.collision import Collision
 from minisim.errors import choice, number
@@ -46,6 +48,11 @@ class Stepped(ABC):
         """The collisions so far, each pair of vehicles once."""
         return tuple(self._collisions.values())
 
+    @property
+    def arrivals(self) -> Arrivals:
+        """The vehicles that want to come, in the order of their ids."""
+        return self._hosted.arrivals
+
     def advance(self, until: float) -> None:
         """Advance to time `until` [s], to the horizon, or to the last arrival.
 
@@ -57,27 +64,33 @@ class Stepped(ABC):
         for _ in self._stretches(first_tick(until, self.site.dt)):
             pass
 
-    def run_until(self, event: float | str | Callable[[Self], bool]) -> bool:
-        """Advance until something happens, or to the end of the run.
+    def run_until(
+        self, event: float | str | Callable[[Self], bool], *, before: float = math.inf
+    ) -> bool:
+        """Advance until something happens, to time `before` [s], or to the end of the run.
 
         Args:
             event: a time [s]; "wake", whenever the plan wakes the session, first at time 0;
                 "collision", when one is recorded; or a function that is asked after each step.
+            before: when to stop if it has not happened.
 
         Returns:
-            Whether it happened. If not, the run is over.
+            Whether it happened.
 
         Raises:
             InputError: no such event.
             CollisionError, ControllerError: as `advance` raises them.
         """
+        latest = self._horizon_tick
+        if before != math.inf:
+            latest = first_tick(number("before [s]", before, low=0), self.site.dt)
         if not isinstance(event, str) and not callable(event):
-            self.advance(event)
+            self.advance(min(event, before))
             return self.tick >= first_tick(event, self.site.dt)
         by_step, before = callable(event), len(self._collisions)
         if isinstance(event, str):
             choice("event", event, EVENTS)
-        for woken in self._stretches(self._horizon_tick, 1 if by_step else NEVER):
+        for woken in self._stretches(latest, 1 if by_step else NEVER):
             if callable(event):
                 happened = event(self)
             else:

@@ -1,7 +1,7 @@
-"""A local page with sliders, which simulates what they say: the server of `minisim lab`.
+"""A page with sliders, which simulates what they say; `minisim lab` serves it to this computer.
 
-It listens on the loopback interface only, and answers only addresses that begin with a random
-token. It reads no file of the user's and writes none.
+The server listens on the loopback interface only, and answers only addresses that begin with a
+random token. It reads no file of the user's and writes none.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from functools import lru_cache
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from urllib.parse import parse_qsl, urlencode, urlsplit
 
 from figures.film.animate import write_animation
@@ -51,7 +51,16 @@ _STEPS = {"density": 10, "humans": 0.05, "error": 0.05, "seconds": 60}
 _ONE_AT_A_TIME = threading.Lock()
 
 
-class Lab(ThreadingHTTPServer):
+class Answer(NamedTuple):
+    """What is sent to the page: bytes and their type, and the name of a file to save them in."""
+
+    data: bytes
+    kind: str
+    status: HTTPStatus = HTTPStatus.OK
+    save_as: str = ""
+
+
+class LabServer(ThreadingHTTPServer):
     """The server. Its `address` is the page, `serve_forever` and `shutdown` run and end it.
 
     Port 0 stands for any free one. Raises `InputError` for a port that is in use.
@@ -81,53 +90,39 @@ class Lab(ThreadingHTTPServer):
 
 
 class _Handler(BaseHTTPRequestHandler):
-    server: Lab
+    server: LabServer
     server_version, sys_version = "minisim", ""
 
     def do_GET(self) -> None:
-        asked = urlsplit(self.path)
-        token, _, what = asked.path.removeprefix("/").partition("/")
+        url = urlsplit(self.path)
+        token, _, what = url.path.removeprefix("/").partition("/")
         hosts = {f"{name}:{self.server.server_port}" for name in (HOST, "localhost")}
         if self.headers.get("Host") not in hosts or not hmac.compare_digest(
             token.encode(), self.server.token.encode()
         ):
-            self._refuse(HTTPStatus.FORBIDDEN, "open the address that minisim lab has printed")
-            return
-        try:
-            if what == "":
-                self._answer(lab_page().encode(), EXPORTS["film.html"])
-            elif what == "scene":
-                self._answer(_answered(asked.query).encode(), EXPORTS["scene.json"])
-            elif what in EXPORTS:
-                self._answer(exported(what, asked.query), EXPORTS[what], save_as=what)
-            else:
-                self._refuse(HTTPStatus.NOT_FOUND, f"the lab has no {what[:40]!r}")
-        except MinisimError as error:
-            self._refuse(HTTPStatus.BAD_REQUEST, str(error))
+            self._send(_refused(HTTPStatus.FORBIDDEN, "open the address that minisim lab printed"))
+        elif what == "":
+            self._send(Answer(lab_page().encode(), EXPORTS["film.html"]))
+        else:
+            self._send(answered(what, url.query))
 
     def log_message(self, format: str, *args: Any) -> None:
         """Say nothing: the token would be in each line."""
 
-    def _refuse(self, status: HTTPStatus, why: str) -> None:
-        self._answer(json.dumps({"error": why}).encode(), EXPORTS["scene.json"], status)
-
-    def _answer(
-        self, data: bytes, kind: str, status: HTTPStatus = HTTPStatus.OK, save_as: str = ""
-    ) -> None:
-        self.send_response(status)
+    def _send(self, answer: Answer) -> None:
+        self.send_response(answer.status)
         for name, value in _SECURITY.items():
             self.send_header(name, value)
-        if save_as:
-            self.send_header("Content-Disposition", f'attachment; filename="{save_as}"')
-        self.send_header("Content-Type", kind)
-        self.send_header("Content-Length", str(len(data)))
+        if answer.save_as:
+            self.send_header("Content-Disposition", f'attachment; filename="{answer.save_as}"')
+        self.send_header("Content-Type", answer.kind)
+        self.send_header("Content-Length", str(len(answer.data)))
         self.end_headers()
-        self.wfile.write(data)
+        self.wfile.write(answer.data)
 
 
-@lru_cache(1)
-def lab_page() -> str:
-    """The page with the sliders."""
+def lab_page(setting: str = "") -> str:
+    """The page with the sliders; in a notebook it shows a `setting` first."""
     fields = [
         {
             "name": it.name, "meaning": it.parameter.meaning, "unit": it.parameter.unit,
@@ -136,7 +131,9 @@ def lab_page() -> str:
         }
         for it in parameters(Setting)
     ]  # fmt: skip
-    return template("lab.html", player=script(), fields=json.dumps(fields))
+    return template(
+        "lab.html", player=script(), fields=json.dumps(fields), setting=json.dumps(setting)
+    )
 
 
 def _range(allowed: str) -> dict[str, float | None]:
@@ -145,7 +142,23 @@ def _range(allowed: str) -> dict[str, float | None]:
     return {"low": float(low), "high": float(high)} if high else {"low": None, "high": None}
 
 
-def _answered(query: str) -> str:
+def answered(what: str, query: str) -> Answer:
+    """What the lab answers to its page: a scene, a file of `EXPORTS`, or why not."""
+    try:
+        if what == "scene":
+            return Answer(_scene(query).encode(), EXPORTS["scene.json"])
+        if what in EXPORTS:
+            return Answer(exported(what, query), EXPORTS[what], save_as=what)
+    except MinisimError as error:
+        return _refused(HTTPStatus.BAD_REQUEST, str(error))
+    return _refused(HTTPStatus.NOT_FOUND, f"the lab has no {what[:40]!r}")
+
+
+def _refused(status: HTTPStatus, why: str) -> Answer:
+    return Answer(json.dumps({"error": why}).encode(), EXPORTS["scene.json"], status)
+
+
+def _scene(query: str) -> str:
     """A scene of one of the runs, with the command line for the setting, as JSON."""
     setting, more = _asked(query, run="0", explained="0")
     which = int(choice("run", more["run"], ("0", "1")[: len(setting.recipes)]))
@@ -185,6 +198,11 @@ def exported(name: str, query: str) -> bytes:
         file = Path(folder) / name
         write_animation(runs[0], file, **when)
         return file.read_bytes()
+
+
+def setting_of(query: str) -> Setting:
+    """What was set when the page asked this; raises `InputError` if that is no setting."""
+    return _asked(query, run="", explained="", **{"from": ""})[0]
 
 
 def _asked(query: str, **more: str) -> tuple[Setting, dict[str, str]]:

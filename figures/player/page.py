@@ -13,8 +13,10 @@ from minisim.errors import InputError
 from minisim.files import AnyPath, write_text
 from minisim.results.run import Run
 
-#: Height of a player in a notebook [px].
-HEIGHT = 580
+#: The player's script, in this order.
+SCRIPTS = ("scene.js", "drawing.js", "pane.js", "player.js")
+#: Height of a player of one run in a notebook, and of one of two [px].
+HEIGHTS = (580, 880)
 
 
 class Player:
@@ -48,7 +50,7 @@ class Player:
     def _repr_html_(self) -> str:
         """A frame of its own, which shares no style, key or script with the notebook."""
         held = self.page("").replace("&", "&amp;").replace("'", "&#39;")
-        style = f"width: 100%; height: {HEIGHT}px; border: 0"
+        style = f"width: 100%; height: {HEIGHTS[len(self.scenes) - 1]}px; border: 0"
         return f"<iframe sandbox='allow-scripts' style='{style}' srcdoc='{held}'></iframe>"
 
 
@@ -71,7 +73,7 @@ def script() -> str:
     colours = "".join(f"--{name}: {colour}; " for name, colour in look().items())
     sheet = f":host {{ {colours}}}\n{_file('player.css')}"
     quoted = json.dumps(sheet).replace("<", r"\u003c")
-    return f"const STYLE = {quoted};\n{_file('player.js')}"
+    return "\n".join([f"const STYLE = {quoted};", *map(_file, SCRIPTS)])
 
 
 def different_arrivals(one: Scene, other: Scene) -> str:

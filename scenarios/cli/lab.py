@@ -29,9 +29,9 @@ def lab(
 
     begun = Setting.read(setting.rpartition("#")[2])
     integer("--port", port, low=0, high=65535)
-    from figures.player.lab import Lab
+    from figures.player.lab import LabServer
 
-    with Lab(port) as server:
+    with LabServer(port) as server:
         address = f"{server.address}#{begun}" if str(begun) else server.address
         try:
             typer.echo(f"The lab is at {address}\nCtrl-C stops it.")

@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from tests import ROOT
-from tests.bench import engine, rivals, scalar, starting
+from tests.bench import engine, learning, rivals, scalar, starting
 
 #: veh/h/lane, and the nanoseconds wanted for a vehicle-step; there our kernel is compared with C.
 DENSITIES = {150: None, 250: None, 350: -16.0, 500: None, 650: None, 800: -10.0}
@@ -40,7 +40,7 @@ class Figure(NamedTuple):
     def median(self) -> float:
         return statistics.median(self.values)
 
-    def over(self, other: Figure, key: str, label: str, wanted: float) -> Figure:
+    def over(self, other: Figure, key: str, label: str, wanted: float | None = None) -> Figure:
         """This figure in units of another's median."""
         ratios = [value / other.median for value in self.values]
         return Figure(key, label, ratios, "×", wanted)
@@ -92,7 +92,29 @@ def _figures(runs: int) -> Iterator[Figure]:
     for arms, most in ((4, 10.0), (8, 45.0), (12, 180.0)):
         times = measured(lambda seed, arms=arms: engine.junction(seed, arms))  # type: ignore[misc]
         yield Figure(f"junction_{arms}_ms", f"new junction of {arms} arms", times, "ms", -most)
+    yield from _learning(runs, measured)
     yield from _starts(runs)
+
+
+def _learning(
+    runs: int, measured: Callable[[Callable[[int], float]], list[float]]
+) -> Iterator[Figure]:
+    label = "vehicles decided on, 64 junctions at once"
+    yield Figure("decisions_per_s", label, measured(learning.decisions), "/s", 100_000.0)
+    label = "steps of a signal"
+    ours = Figure("signal_steps_per_s", label, measured(learning.signal_steps), "/s")
+    yield ours
+    for key, name, of in (
+        ("sumo_rl", "sumo-rl", learning.sumo_rl_steps),
+        ("highway", "highway-env", learning.highway_steps),
+    ):
+        found = [it for seed in range(runs) if (it := of(seed)) is not None]
+        if not found:
+            print(f"{name} is not installed (pip install {name}): not compared")
+            continue
+        theirs = Figure(f"{key}_steps_per_s", f"steps of {name}", found, "/s")
+        yield theirs
+        yield ours.over(theirs, f"{key}_ratio", f"steps of a signal / steps of {name}")
 
 
 def _taste() -> Iterator[Figure]:
@@ -104,6 +126,7 @@ def _taste() -> Iterator[Figure]:
     yield from _against_c(step, 350, lambda: [scalar.vehicle_step(1, 350, 60.0)])
     yield Figure("minutes_per_s", "one-minute runs", [engine.minutes(1, 2)], "/s")
     yield Figure("junction_4_ms", "new junction of 4 arms", [engine.junction(1, 4)], "ms")
+    yield Figure("decisions_per_s", "vehicles decided on", [learning.decisions(1, 2, 20)], "/s")
     yield Figure("help_s", "minisim --help", [starting.command("--help")], "s")
 
 

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import base64
+import json
 import threading
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from figures.player.lab import Lab
+from figures.player.lab import LabServer, answered, lab_page
+from tests import ROOT
 from tests.browser.chromium import Browser, Page, browser_path, chromium
 
 pytestmark = [
@@ -22,8 +25,8 @@ EXPLAINED = f"{PLAYER}.panes.length && {PLAYER}.panes.every((it) => it.scene.dat
 
 
 @pytest.fixture(scope="module")
-def lab() -> Iterator[Lab]:
-    with Lab() as server:
+def lab() -> Iterator[LabServer]:
+    with LabServer() as server:
         thread = threading.Thread(target=server.serve_forever)
         thread.start()
         yield server
@@ -37,7 +40,9 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
         yield running
 
 
-def opened(browser: Browser, lab: Lab, setting: str, window: tuple[int, int] = (1280, 720)) -> Page:
+def opened(
+    browser: Browser, lab: LabServer, setting: str, window: tuple[int, int] = (1280, 720)
+) -> Page:
     shown = browser.page(calm=True)
     shown.size(*window)
     shown.open(f"{lab.address}#{setting}")
@@ -50,7 +55,7 @@ def put(shown: Page, name: str, value: object) -> None:
       it.value = '{value}'; it.dispatchEvent(new Event('input', {{ bubbles: true }})); }})()""")
 
 
-def test_sliders_simulate_and_the_address_holds_them(browser: Browser, lab: Lab) -> None:
+def test_sliders_simulate_and_the_address_holds_them(browser: Browser, lab: LabServer) -> None:
     shown = opened(browser, lab, "seconds=60")
     shown.until(EXPLAINED)
     assert shown.run(f"{PLAYER}.panes.map((it) => it.name.textContent)") == ["dim"]
@@ -75,7 +80,7 @@ def test_sliders_simulate_and_the_address_holds_them(browser: Browser, lab: Lab)
         assert all(it.startswith(lab.address) for it in page.requests)
 
 
-def test_what_has_no_effect_cannot_be_moved(browser: Browser, lab: Lab) -> None:
+def test_what_has_no_effect_cannot_be_moved(browser: Browser, lab: LabServer) -> None:
     shown = opened(browser, lab, "humans=0.5&seconds=60")
     shown.until(EXPLAINED)
     put(shown, "controller", "fixed-time")
@@ -85,17 +90,19 @@ def test_what_has_no_effect_cannot_be_moved(browser: Browser, lab: Lab) -> None:
     assert shown.errors == []
 
 
-def test_a_wrong_value_in_an_address_is_told(browser: Browser, lab: Lab) -> None:
-    shown = opened(browser, lab, "density=350&gait=clear")
+def test_a_wrong_value_in_an_address_is_told(browser: Browser, lab: LabServer) -> None:
+    shown = opened(browser, lab, "density=350&gait=clear", (390, 844))
     shown.until("document.getElementById('said').textContent")
-    assert "did you mean 'gate'" in shown.run("document.getElementById('said').textContent")
+    assert "did you mean 'gate'" in shown.run("document.getElementById('said').innerText")
     put(shown, "density", 100)
     shown.until(EXPLAINED)
     assert shown.run("document.getElementById('said').textContent") == ""
 
 
 @pytest.mark.parametrize("window", [(390, 844), (1280, 720), (1920, 950)])
-def test_the_play_button_is_in_view(browser: Browser, lab: Lab, window: tuple[int, int]) -> None:
+def test_the_play_button_is_in_view(
+    browser: Browser, lab: LabServer, window: tuple[int, int]
+) -> None:
     shown = opened(browser, lab, "seconds=60&arms=5&gate=harmonious", window)
     shown.until(EXPLAINED)
     box = shown.run(f"{PLAYER}.shadowRoot.querySelector('.play').getBoundingClientRect().toJSON()")
@@ -106,7 +113,7 @@ def test_the_play_button_is_in_view(browser: Browser, lab: Lab, window: tuple[in
     assert picture["bottom"] <= box["top"], "the controls do not cover the picture"
 
 
-def test_an_export_is_a_download(browser: Browser, lab: Lab, tmp_path: Path) -> None:
+def test_an_export_is_a_download(browser: Browser, lab: LabServer, tmp_path: Path) -> None:
     shown = opened(browser, lab, "seconds=60&density=200")
     shown.until(EXPLAINED)
     shown.ask("Page.setDownloadBehavior", behavior="allow", downloadPath=str(tmp_path))
@@ -118,3 +125,45 @@ def test_an_export_is_a_download(browser: Browser, lab: Lab, tmp_path: Path) -> 
             break
         shown.run("new Promise((done) => setTimeout(done, 20))")
     assert (tmp_path / "scene.json").read_text().startswith('{"format":"minisim scene"')
+
+
+def test_in_a_notebook_the_kernel_answers(browser: Browser, tmp_path: Path) -> None:
+    """The page is in a frame that reaches nothing; the widget carries its questions."""
+    widget = (ROOT / "figures/player/notebook.js").read_text(encoding="utf-8")
+    page = json.dumps(lab_page("seconds=60")).replace("<", r"\u003c")
+    file = tmp_path / "notebook.html"
+    file.write_text(f"""<!doctype html><link rel="icon" href="data:,"><div id="cell"></div><script>
+      {widget.replace("export default", "const widget =")}
+      const asked = [];
+      let answer;
+      const model = {{ get: () => {page}, send: (it) => asked.push(it),
+                      on: (_, f) => {{ answer = f; }}, off() {{}} }};
+      const stop = widget.render({{ model, el: document.getElementById("cell") }});
+    </script>""", encoding="utf-8")  # fmt: skip
+    shown = browser.page(calm=True)
+    shown.size(1280, 800)
+    shown.open(file.as_uri())
+
+    def questions() -> list[str]:
+        """Answer all questions until the reasons are there."""
+        told = []
+        while not told or "explained=1" not in told[-1]:
+            shown.until("asked.length")
+            question = shown.run("asked.shift()")
+            said = answered(question["what"], question["query"])
+            data = base64.b64encode(said.data).decode()
+            shown.run(f"""answer({{ id: {question["id"]}, status: {int(said.status)} }},
+              [new DataView(Uint8Array.from(atob("{data}"), (it) => it.charCodeAt()).buffer)])""")
+            told.append(question["query"])
+        return told
+
+    assert questions() == [f"seconds=60&run=0&explained={k}" for k in (0, 1)]
+    for _ in range(8):  # into the frame, and from control to control until one changes
+        shown.press("Tab")
+        shown.press("ArrowRight")
+        if shown.run("new Promise((done) => setTimeout(() => done(asked.length), 400))"):
+            break
+    assert questions()[-1].endswith("&seconds=60&run=0&explained=1")
+    assert shown.errors == []
+    assert set(shown.requests) - {"about:srcdoc"} == {file.as_uri()}
+    shown.run("stop()")

@@ -14,7 +14,7 @@ import minisim
 from baselines import FixedTime
 from dim import Dim
 from figures import Player, play
-from figures.player.page import HEIGHT, script
+from figures.player.page import HEIGHTS, script
 from figures.player.scene import dumped, scene
 from minisim.control import Unregulated
 from minisim.results.run import Run
@@ -183,8 +183,11 @@ def test_keys_also_after_clicks(
 
 
 @pytest.mark.slow
-def test_decisions_one_after_the_other(browser: Browser, files: dict[str, Path]) -> None:
-    shown = opened(browser, files["one"], (1280, 720))
+@pytest.mark.parametrize("window", WINDOWS)
+def test_decisions_one_after_the_other(
+    browser: Browser, files: dict[str, Path], window: tuple[int, int]
+) -> None:
+    shown = opened(browser, files["one"], window)
     times = []
     for _ in range(3):
         shown.run(f"{PART}('.on').click()")
@@ -193,7 +196,7 @@ def test_decisions_one_after_the_other(browser: Browser, files: dict[str, Path])
     goes = f"{PLAYER}.panes[0].cars.filter((it) => it.goes).map((it) => it.track.id)"
     now = set(shown.run(goes))
     shown.run(f"{PLAYER}.time -= 0.1")
-    assert now - set(shown.run(goes)), "somebody has got the right of way"
+    assert now - set(shown.run(goes)), "a vehicle has got the right of way"
     shown.run(f"{PART}('.back').click()")
     assert shown.run(f"{PLAYER}.time") == pytest.approx(times[1])
     vehicle, _ = go_to_a_wait(shown, "other clique")
@@ -206,14 +209,16 @@ def test_decisions_one_after_the_other(browser: Browser, files: dict[str, Path])
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("window", WINDOWS)
 def test_the_graph_the_strip_and_the_marks_follow_the_choice(
-    browser: Browser, files: dict[str, Path]
+    browser: Browser, files: dict[str, Path], window: tuple[int, int]
 ) -> None:
-    shown = opened(browser, files["one"], (1280, 720))
+    shown = opened(browser, files["one"], window)
     vehicle, why = go_to_a_wait(shown, "other clique")
     copied = f"{PART}('canvas.junction').toDataURL()"
     plain = shown.run(copied)
-    shown.run(f"{PLAYER}.select({vehicle})")
+    shown.click(*where(shown, vehicle))
+    assert shown.run(f"{PART}('.why').textContent") == why["sentence"]
     assert shown.run(copied) != plain, "rings, ways and crossings are drawn"
     label = shown.run(f"{PART}('.graph').getAttribute('aria-label')")
     goes, waits = label.split("Wait:")
@@ -238,10 +243,11 @@ def test_the_graph_the_strip_and_the_marks_follow_the_choice(
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("window", WINDOWS)
 def test_two_runs_share_the_clock_and_the_choice(
-    browser: Browser, files: dict[str, Path], runs: list[Run]
+    browser: Browser, files: dict[str, Path], runs: list[Run], window: tuple[int, int]
 ) -> None:
-    shown = opened(browser, files["two"], (1280, 720))
+    shown = opened(browser, files["two"], window)
     shown.run(f"{PLAYER}.time = 75")
     both = shown.run(f"""{PLAYER}.panes[0].cars.map((it) => it.track.id).find((id) =>
       {PLAYER}.panes[1].cars.some((it) => it.track.id === id &&
@@ -252,6 +258,39 @@ def test_two_runs_share_the_clock_and_the_choice(
     for run, text in zip(runs, said, strict=True):
         assert text.startswith(run.why(both, 75.0).sentence)
     assert shown.run(f"{PLAYER}.panes.map((it) => it.name.textContent)") == ["dim", "fixed-time"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("window", WINDOWS)
+def test_the_other_controls(
+    browser: Browser, files: dict[str, Path], window: tuple[int, int]
+) -> None:
+    """Speed, the vehicle's number, the name of an arm, and the legend."""
+    shown = opened(browser, files["one"], window)
+    passed = shown.run(f"""new Promise((done) => {{
+      const player = {PLAYER}, from = player.time, at = performance.now();
+      player.rate.value = "8";
+      player.rate.dispatchEvent(new Event("change"));
+      player.play(true);
+      setTimeout(() => done((player.time - from) / (performance.now() - at) * 1000), 600);
+    }})""")
+    assert passed == pytest.approx(8.0, rel=0.25)
+    shown.run(f"{PLAYER}.play(false)")
+    vehicle, why = go_to_a_wait(shown, "other clique")
+    shown.run(f"{PLAYER}.number.focus()")
+    for digit in str(vehicle):
+        shown.ask("Input.insertText", text=digit)
+    assert shown.run(f"{PART}('.why').textContent") == why["sentence"]
+    x, y = shown.run(f"""(() => {{ const pane = {PLAYER}.panes[0], [x, y] = pane.namePlaces()[2];
+      const box = pane.canvas.getBoundingClientRect(), k = box.width / (2 * {PLAYER}.reach);
+      return [box.left + box.width / 2 + k * x, box.top + box.height / 2 - k * y]; }})()""")
+    shown.click(x, y)
+    assert shown.run(f"[{PLAYER}.chosen, {PLAYER}.lane, {PLAYER}.lanes.value]") == [None, 2, "2"]
+    assert "lane c" in shown.run(f"{PART}('.strip').getAttribute('aria-label')")
+    listed = [shown.run(f"({PART}('.legend summary').click(), {PART}('.legend').offsetHeight)")
+              for _ in range(2)]  # fmt: skip
+    assert 0 < 2 * listed[0] < listed[1], "folded, and open again"
+    at_rest(shown, files["one"])
 
 
 @pytest.mark.slow
@@ -325,17 +364,18 @@ def test_two_players_on_one_page(browser: Browser, runs: list[Run], tmp_path: Pa
 @pytest.mark.slow
 def test_two_players_in_one_notebook(browser: Browser, runs: list[Run], tmp_path: Path) -> None:
     """As a saved notebook holds them: what one does, the other does not."""
+    height = HEIGHTS[0]
     shows = "".join(play(it, start=START, seconds=SECONDS)._repr_html_() for it in runs)
     file = tmp_path / "notebook.html"
     file.write_text(f'<!doctype html><link rel="icon" href="data:,">{shows}', encoding="utf-8")
     shown = browser.page()
-    shown.size(1000, 2 * HEIGHT + 40)
+    shown.size(1000, 2 * height + 40)
     shown.open(file.as_uri())
 
     def looks() -> list[Image.Image]:
         shown.picture(tmp_path / "seen.png")
         seen = Image.open(tmp_path / "seen.png")
-        return [seen.crop((20, y + 70, 400, y + 400)) for y in (8, 8 + HEIGHT)]  # the junctions
+        return [seen.crop((20, y + 70, 400, y + 400)) for y in (8, 8 + height)]  # the junctions
 
     def until(changed: tuple[bool, bool]) -> list[Image.Image]:
         for _ in range(100):
@@ -346,12 +386,12 @@ def test_two_players_in_one_notebook(browser: Browser, runs: list[Run], tmp_path
 
     shown.run("new Promise((done) => setTimeout(done, 500))")
     before = looks()
-    shown.click(45, HEIGHT - 30)  # the first one's play button
+    shown.click(45, height - 30)  # the first one's play button
     before = until((True, False))
     shown.press(" ")
     before = looks()
     assert looks() == before, "Space stops the one that was clicked"
-    shown.click(45, 2 * HEIGHT - 30)
+    shown.click(45, 2 * height - 30)
     until((False, True))
     at_rest(shown, file)
 
@@ -366,6 +406,10 @@ def test_a_collision_is_counted(browser: Browser, tmp_path: Path) -> None:
     shown.run(f"{PLAYER}.time = {PLAYER}.last")
     assert shown.run(f"{PART}('.counts').textContent").startswith("collisions 1 · standing")
     assert shown.run(f"{PART}('.counts').textContent").endswith("served 0")
+    shown.run(f"{PLAYER}.select(1)")
+    assert shown.run(f"{PART}('.why').textContent").startswith(
+        "It has collided with vehicle 0. Veh"
+    )
     assert "2 recorded arrivals" in shown.run(f"{PART}('.what').textContent")
     assert "crossed out" in shown.run(f"{PART}('.legend').textContent")
     at_rest(shown, file)

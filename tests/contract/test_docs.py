@@ -16,7 +16,7 @@ from minisim.simulation import simulate
 from tests import ROOT
 from tests.builders import digest
 
-DOCS = "benchmark", "counts", "messages", "pcu", "safety", "stepping"
+DOCS = "benchmark", "counts", "messages", "pcu", "safety", "scene", "stepping"
 PAGES = ("README.md", *(f"docs/{name}.md" for name in DOCS))
 
 
@@ -75,3 +75,10 @@ def test_a_search_looks_ahead(capsys: pytest.CaptureFixture[str]) -> None:
     assert digest(made["run"]) == digest(simulate(made["scenario"], Dim(), 1))
     exec(compile(search, "docs/stepping.md", "exec"), {})
     assert int(capsys.readouterr().out) > 0
+
+
+def test_an_environment_is_used(capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("gymnasium", reason="needs the extra gym")
+    (example,) = blocks("docs/environments.md")
+    exec(compile(example, "docs/environments.md", "exec"), {})
+    assert int(capsys.readouterr().out) > 30

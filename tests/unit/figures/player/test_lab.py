@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 
 from figures.player import lab as lab_module
-from figures.player.lab import HOST, Lab, exported
+from figures.player.lab import HOST, LabServer, exported
 from minisim.errors import InputError
 from scenarios.lab import Setting
 from tests import ROOT
@@ -25,8 +25,8 @@ SHORT = "density=400&seconds=60"
 
 
 @pytest.fixture(scope="module")
-def lab() -> Iterator[Lab]:
-    with Lab() as server:
+def lab() -> Iterator[LabServer]:
+    with LabServer() as server:
         thread = threading.Thread(target=server.serve_forever)
         thread.start()
         yield server
@@ -35,7 +35,12 @@ def lab() -> Iterator[Lab]:
 
 
 def ask(
-    lab: Lab, path: str, *, token: str | None = None, host: str | None = None, method: str = "GET"
+    lab: LabServer,
+    path: str,
+    *,
+    token: str | None = None,
+    host: str | None = None,
+    method: str = "GET",
 ) -> tuple[int, Any, bytes]:
     connection = http.client.HTTPConnection(HOST, lab.server_port, timeout=300)
     connection.putrequest(method, f"/{lab.token if token is None else token}{path}", skip_host=True)
@@ -47,15 +52,15 @@ def ask(
     return answer.status, answer.headers, data
 
 
-def test_it_listens_on_the_loopback_interface_only(lab: Lab) -> None:
+def test_it_listens_on_the_loopback_interface_only(lab: LabServer) -> None:
     assert lab.server_address[0] == "127.0.0.1"
     assert lab.address == f"http://127.0.0.1:{lab.server_port}/{lab.token}/"
     assert len(lab.token) >= 20
-    with Lab() as other:
+    with LabServer() as other:
         assert other.token != lab.token
 
 
-def test_the_page_is_there_for_its_address_only(lab: Lab) -> None:
+def test_the_page_is_there_for_its_address_only(lab: LabServer) -> None:
     status, headers, data = ask(lab, "/")
     assert status == 200
     assert b"minisim-player" in data
@@ -65,13 +70,13 @@ def test_the_page_is_there_for_its_address_only(lab: Lab) -> None:
         for token in ("", "wrong", lab.token[:-1], lab.token + "x", "%00", "é".encode().hex()):
             status, _, data = ask(lab, path, token=token)
             assert status == 403, (path, token)
-            assert json.loads(data) == {"error": "open the address that minisim lab has printed"}
+            assert json.loads(data) == {"error": "open the address that minisim lab printed"}
         for host in ("", "evil.example", f"evil.example:{lab.server_port}", HOST):
             assert ask(lab, path, host=host)[0] == 403, (path, host)
     assert ask(lab, "/", host=f"localhost:{lab.server_port}")[0] == 200
 
 
-def test_it_gives_no_other_file(lab: Lab) -> None:
+def test_it_gives_no_other_file(lab: LabServer) -> None:
     for path in (
         "/lab.html",
         "/player.js",
@@ -85,7 +90,7 @@ def test_it_gives_no_other_file(lab: Lab) -> None:
     assert ask(lab, "/", method="POST")[0] == 501
 
 
-def test_it_simulates_a_setting(lab: Lab) -> None:
+def test_it_simulates_a_setting(lab: LabServer) -> None:
     for run, name in enumerate(("dim", "fixed-time")):
         status, _, data = ask(lab, f"/scene?{SHORT}&beside=fixed-time&run={run}&explained=1")
         assert status == 200
@@ -106,13 +111,13 @@ def test_it_simulates_a_setting(lab: Lab) -> None:
         ("profile=mine.toml", "unknown profile"),
     ],
 )  # fmt: skip
-def test_a_wrong_value_is_told_in_a_sentence(lab: Lab, query: str, said: str) -> None:
+def test_a_wrong_value_is_told_in_a_sentence(lab: LabServer, query: str, said: str) -> None:
     status, _, data = ask(lab, f"/scene?{query}")
     assert status == 400
     assert said in json.loads(data)["error"]
 
 
-def test_exports(lab: Lab) -> None:
+def test_exports(lab: LabServer) -> None:
     begins = {"film.html": b"<!doctype html>", "film.gif": b"GIF89a", "scene.json": b"{"}
     for name, begin in begins.items():
         status, headers, data = ask(lab, f"/{name}?{SHORT}&from=58.5")
@@ -134,9 +139,9 @@ def test_ten_minutes_are_simulated_in_half_a_second() -> None:
     assert time.process_time() - begin < 0.5
 
 
-def test_a_port_in_use_is_told(lab: Lab) -> None:
+def test_a_port_in_use_is_told(lab: LabServer) -> None:
     with pytest.raises(InputError, match=f"cannot listen on port {lab.server_port}: .*in use"):
-        Lab(lab.server_port)
+        LabServer(lab.server_port)
 
 
 @pytest.mark.slow
