@@ -77,8 +77,8 @@ def overall_figure(result: Result) -> Figure:
     style.write(figure, (left + 5.5) / width, 1.0 - 0.5 / high, "rank", 9.5, bold=True)
     note = (
         f"{_extent(result)}  Geometric mean over {plural(len(result.plain), 'cell')} without "
-        "errors and humans; 95 % intervals over seeds. In brackets the ranks that are possible, "
-        "with 95 % confidence for all together."
+        "errors, lost messages and humans; 95 % intervals over seeds. In brackets the ranks that "
+        "are possible, with 95 % confidence for all together."
     )
     _framed(figure, titled(result, "overall"), note)
     return figure

@@ -104,7 +104,8 @@ def _overall_table(standings: Mapping[str, Standing]) -> Table:
         return f"{low:.2f} to {high:.2f}" if it.size > 1 else "–"
 
     return Table(
-        "Times the least delay, geometric mean over the cells without errors and humans",
+        "Times the least delay, geometric mean over the cells without errors, lost messages and "
+        "humans",
         ("controller", "rank", "times the least", "95 % interval"),
         tuple(
             (label(name), it.words, f"{math.exp(it.mean.mean):.2f}", interval(it.mean))

@@ -89,10 +89,6 @@ class Optimum:
         """The numbers, for JSON."""
         return {"vehicles": self.vehicles, "bound_s": self.bound, "planned_s": self.planned}
 
-    def above(self, delay: float) -> float | None:
-        """By how much a mean delay [s] exceeds the bound [%]; None if the bound is 0."""
-        return 100.0 * (delay - self.bound) / self.bound if self.bound > 0.0 else None
-
     @cached_property
     def _kind(self) -> Ints:
         """The movement of each vehicle, those of each type in turn, shape (k,)."""
@@ -154,8 +150,12 @@ def compared(
             why = "a vehicle did not arrive" if delay is None else ""
         except CollisionError as error:
             delay, why = None, str(error)
-        above = None if delay is None else least.above(delay)
-        yield row | {"delay_s": delay, "above_percent": above, "error": why}
+        yield row | {"delay_s": delay, "above_percent": above(delay, least.bound), "error": why}
+
+
+def above(delay: float | None, least: float | None) -> float | None:
+    """By how much a delay exceeds the least one [%]; None if one is not known or the least is 0."""
+    return 100.0 * (delay - least) / least if least and delay is not None else None
 
 
 def mean_delay(run: Run) -> float | None:
@@ -182,8 +182,7 @@ def _least_delay(run: Run) -> float | None:
 
 
 def _above(run: Run) -> float | None:
-    delay, least = mean_delay(run), _least_delay(run)
-    return 100.0 * (delay - least) / least if least and delay is not None else None
+    return above(mean_delay(run), _least_delay(run))
 
 
 DELAY = Metric(

@@ -47,8 +47,9 @@ from minisim.errors import FileError
 from minisim.junction.movements import ARM_NAMES
 from minisim.laws import Law
 from minisim.results.run import Run
+from minisim.results.trajectories import TRAJECTORY_COLUMNS
 from minisim.simulation import Simulation
-from minisim.testing import SmallScenario
+from minisim.testing import SmallScenario, small_scenario
 from minisim.vehicle import VehicleType
 from scenarios import Scenario
 from scenarios.library import four_way
@@ -554,3 +555,27 @@ def read_count(
     path = folder / "sheet.csv"
     path.write_bytes(text.encode(encoding))
     return read_counts(path, mapping)
+
+
+def at(
+    vehicle: int, movement: str, s: float, v: float, *, time: float = 0.0, row: bool = True,
+    a: float = 0.0,
+) -> dict[str, Any]:  # fmt: skip
+    """One row of a trajectory frame of a `small_scenario`; `s` from the junction entry."""
+    entry = small_scenario(4).intersection.approach_length
+    zero = dict.fromkeys(TRAJECTORY_COLUMNS, 0.0)
+    return zero | {
+        "time_s": time, "vehicle": vehicle, "lane": movement[0], "manoeuvre": int(movement[1]),
+        "s_m": entry + s, "speed_mps": v, "acceleration_mps2": a, "right_of_way": row,
+    }  # fmt: skip
+
+
+def frame_of(*rows: dict[str, Any]) -> pd.DataFrame:
+    """A trajectory frame."""
+    return pd.DataFrame(list(rows), columns=list(TRAJECTORY_COLUMNS))
+
+
+def glide(vehicle: int, movement: str, start: float, v: float) -> list[dict[str, Any]]:
+    """A vehicle at constant speed whose front passes the entry at `start`; a row per 0.1 s."""
+    times = np.arange(round(start * 10) - 60, round(start * 10) + 60) / 10.0
+    return [at(vehicle, movement, v * (t - start), v, time=t) for t in times.tolist()]

@@ -34,9 +34,11 @@ from minisim.control.radio import Radio
 from minisim.control.silent import External, Unregulated
 from minisim.control.site import LATERAL_ACCELERATION, Site
 from minisim.control.view import (
+    AT_LINE,
     COMMIT_MARGIN,
     HALTING,
     NO_REPORTS,
+    SUMO_AT_LINE,
     Observed,
     Report,
     View,
@@ -45,12 +47,14 @@ from minisim.control.view import (
 )
 
 __all__ = [
+    "AT_LINE",
     "COMMIT_MARGIN",
     "HALTING",
     "LATERAL_ACCELERATION",
     "NOTHING",
     "NO_REPORTS",
     "ORDINARY",
+    "SUMO_AT_LINE",
     "TO_LANES",
     "TO_VEHICLES",
     "Accelerate",

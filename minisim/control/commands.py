@@ -24,8 +24,9 @@ class Reserve(Go):
     """Give one vehicle the right of way from `time` on, as long as it keeps to a passage.
 
     For sessions whose messages fail (`minisim.link`); a host by itself takes it for a `Go`. It is
-    void if it arrives later than `time`, and no `Hold` takes it back. The vehicle gives it up by
-    itself once `keeps(vehicle, time)` is false, if it can still stop.
+    void if it arrives later than `time`, and no `Hold` takes it back. Advice does not count from
+    `time` on. The vehicle gives the passage up by itself, and keeps to its last advice again, once
+    `keeps(vehicle, time)` is false, if it can still stop.
     """
 
     time: float  # [s]

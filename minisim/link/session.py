@@ -156,6 +156,8 @@ class Link:
                 self._down.send(now, Confirmed(status.vehicle.id))
         if wake:
             commands += self._decide(now)
+        for promise in office.promises(now, self._interval):
+            self._down.send(now, promise)
         for order in office.orders(now, self._interval):
             self._down.send(now, order)
         for message in self._down.receive(now):
@@ -173,8 +175,6 @@ class Link:
             check_command(command, now, self._site)
             if isinstance(command, Wake):
                 self._alarm.set(command)
-            elif isinstance(command, Reserve):
-                self._down.send(now, command)
             elif isinstance(command, TO_VEHICLES):
                 self._office.take(command)
             else:

@@ -56,7 +56,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         _check_once(given)
         with terminable():
-            code = app(given or ["--help"], prog_name="minisim", standalone_mode=False)
+            code = app(given or ["--help"], prog_name="minisim", standalone_mode=False, obj=given)
         sys.stdout.flush()
     except MinisimError as error:
         if os.environ.get("MINISIM_TRACEBACK"):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from typing import Annotated
 
 import typer
@@ -40,5 +39,6 @@ def _root(
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
     ] = False,
 ) -> None:
-    if context.invoked_subcommand in _SIMULATING and not {"-h", "--help"} & set(sys.argv):
+    given = context.obj or ()  # from `scenarios.cli.main`
+    if context.invoked_subcommand in _SIMULATING and not {"-h", "--help"} & {*given}:
         announce_if_new()
