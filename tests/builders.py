@@ -193,6 +193,7 @@ class Pedals:
     controller: Controller
     seed: int = 0
     often: float = 0.2
+    press: Callable[[int, float], Command] = Accelerate
     name: str = "pedals"
 
     def start(self, site: Site) -> Session:
@@ -204,7 +205,7 @@ class Pedals:
             yield from session.decide(view._replace(vehicles=near))
             for vehicle in view.vehicles:
                 if chance.random() < self.often:
-                    yield Accelerate(vehicle.id, chance.choice(PEDALS))
+                    yield self.press(vehicle.id, chance.choice(PEDALS))
 
         sight = site.intersection.approach_length
         return ScriptedSession(dataclasses.replace(plan, period=0.5, sight=sight), decide)

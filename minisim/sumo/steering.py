@@ -169,18 +169,21 @@ class Follower(Steering):
         entry = self._law.entry
         self._enter(lanes)
         inside = {car.path for car in self._inside}
+        told = any(car.told < math.inf for lane in lanes for car in lane)
+        wary = told or any(car.brake > 0.0 for lane in lanes for car in lane)
         for lane in lanes:
             foremost = True  # on the approach; it also follows vehicles from other lanes
             for k, car in enumerate(lane):
                 held = car.s < entry and not released(car)
                 crossed = not inside.isdisjoint(self._crossing[car.path])
-                told = car.told < math.inf
-                merges = (crossed or told) and not held and (car.s >= entry or foremost)
+                alone = crossed or car.told < math.inf  # SUMO does not follow for it
+                merges = alone and not held and (car.s >= entry or foremost)
                 foremost &= car.s >= entry
                 z = self._closeness(car, self._merging(car)) if merges else 0.0
-                if told:  # SUMO follows for none that has a command
-                    z = max(z, self._closeness(car, self._leaving(car)))
-                self._steer(car, lane[:k], held, z)
+                ahead = [*self._leading(car, lane[:k])] if wary else []
+                if told:  # else no look at those that have left is recent
+                    ahead += self._leaving(car)
+                self._steer(car, lane[:k], held, z, ahead)
                 ignoring = held or crossed
                 if ignoring != car.ignoring:
                     self._vehicle.setSpeedMode(car.name, IGNORING if ignoring else FOLLOWING)
@@ -198,7 +201,16 @@ class Follower(Steering):
         asked = [float(laws.closeness(car.v, gap, it.v, me, law)) for gap, it in ahead]
         return max(asked, default=0.0)
 
-    def _steer(self, car: Car, lane: Sequence[Car], held: bool, z: float) -> None:
+    def _room(self, car: Car, ahead: Iterable[Gap]) -> float:
+        """The room in which the car must be able to stop behind these; see `laws.room_behind`."""
+        me, law = car.traits, self._law
+        rooms = [laws.room_behind(gap, it.v, it.traits.b_max, me, law) for gap, it in ahead]
+        return float(min(rooms, default=math.inf))
+
+    def _steer(
+        self, car: Car, lane: Sequence[Car], held: bool, z: float, ahead: Sequence[Gap]
+    ) -> None:
+        """Steer a car; it keeps room behind `ahead`, which commands may make brake hard."""
         law, me = self._law, car.traits
         v, s, section = car.v, car.s, car.section
         starts, speeds = self._limits[car.path]
@@ -209,7 +221,9 @@ class Follower(Steering):
         held = held and near(v, law.hold - s, me, law)
         # SUMO would drop to a lower desired speed at once, so the law does the braking.
         self._desire(car, max(v0, v))
-        ours = v > v0 or v0 < LEAST_SPEED or car.told < math.inf
+        room = self._room(car, ahead)
+        tight = laws.short_of(room, v, v + me.a * law.dt, me, law)
+        ours = v > v0 or v0 < LEAST_SPEED or car.told < math.inf or tight
         if not (slower or held or car.brake > 0.0 or ours or z > 0.0):
             self.release(car)
             return
@@ -223,8 +237,10 @@ class Follower(Steering):
         if car.brake > 0.0:
             acc = min(acc, -car.brake)
         if acc < free or ours:
-            z = max(z, self._closeness(car, self._leading(car, lane)))
+            z = max(z, self._closeness(car, ahead or self._leading(car, lane)))
             acc = min(acc, self._drive(car, limit, z))
+            if tight:
+                acc = min(acc, float(laws.keep_room(v, room, me, law)))
             self.command(car, v + max(acc, -me.b_max) * law.dt)
         else:
             self.release(car)

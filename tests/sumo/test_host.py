@@ -229,13 +229,23 @@ def test_a_platoon_obeys_alike(model: str, tolerance: float) -> None:
     assert hardest_braking(theirs) == pytest.approx(profile.vehicle.max_deceleration)
 
 
+def brake(vehicle: int, acceleration: float) -> Brake:
+    return Brake(vehicle, max(-acceleration, 0.0))
+
+
+@pytest.mark.parametrize("press", [Accelerate, brake])
 @pytest.mark.parametrize("model", ["IDM", "Krauss"])
-def test_no_sequence_of_accelerations_is_beyond_a_vehicle_or_makes_two_touch(model: str) -> None:
-    scenario = small_scenario(4, density=900.0, demand_time=20.0, drain=40.0)
-    run = simulate(scenario, Pedals(Dim(), 1), 1, model=model, record="all")
-    vehicle = run.site.vehicle
+def test_no_sequence_of_commands_is_beyond_a_vehicle_or_makes_two_touch(
+    model: str, press: Callable[[int, float], Command]
+) -> None:
+    """Vehicles brake three times as hard as Krauss expects of those ahead of them."""
+    vehicle = VehicleType(acceleration=4.0, deceleration=3.0, headway=0.5, min_gap=1.0)
+    scenario = small_scenario(
+        4, density=1200.0, demand_time=30.0, drain=40.0, dt=0.5, vehicle=vehicle
+    )
+    run = simulate(scenario, Pedals(Dim(), 1, 0.3, press), 1, model=model, record="all")
     assert hardest_braking(run) <= vehicle.max_deceleration + 1e-6
-    assert run.trace["a"].max() == pytest.approx(vehicle.acceleration)
+    assert run.trace["a"].max() <= vehicle.acceleration + 1e-6
 
 
 @pytest.mark.parametrize(
