@@ -22,7 +22,6 @@ from scenarios.benchmark.ranking import (
     scores,
 )
 from scenarios.benchmark.results import Result
-from scenarios.controllers import label_of
 from scenarios.optimum import ABOVE
 from scenarios.statistics import Interval, mean_interval
 
@@ -203,7 +202,7 @@ def _mean(values: pd.Series[Any]) -> float:
 
 def label(name: str) -> str:
     """What figures and tables call a controller."""
-    return "schedule (knows all arrivals)" if name == SCHEDULE else label_of(name)
+    return style.look(name).label
 
 
 def _margin(order: Iterable[str]) -> float:

@@ -338,9 +338,12 @@ def drive(
 CURVES = {
     "dim": (0.6, 380.0), "dim:gate=harmonious": (0.4, 520.0),
     "dim:priorities=rotating": (0.6, 380.0), "dim:priorities=waiting": (0.6, 380.0),
-    "fixed-time": (8.0, 400.0), "adaptive": (5.0, 450.0), "v2ic": (0.1, 480.0),
-    "all-way-stop": (1.5, 550.0), "schedule": (0.1, 700.0),
+    "dim:gate=passed": (0.4, 540.0), "fixed-time": (8.0, 400.0), "adaptive": (5.0, 450.0),
+    "v2ic": (0.1, 480.0), "all-way-stop": (1.5, 550.0), "schedule": (0.1, 700.0),
     "reservation": (0.3, 600.0), "max-pressure": (4.0, 460.0),
+    "fixed-time:facing=true": (2.0, 380.0), "max-pressure:facing=true": (2.0, 440.0),
+    "slots": (0.2, 580.0), "slots:batch=1": (0.3, 560.0),
+    "platoons": (0.2, 620.0), "platoons:service=gated": (0.2, 600.0),
 }  # fmt: skip
 
 

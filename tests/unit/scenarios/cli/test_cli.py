@@ -525,7 +525,7 @@ def test_demo_quick(capsys: Captured, tmp_path: Path) -> None:
     out = ok(capsys, "demo", "--quick", "--out", str(folder), "--jobs", "1")
     names = ["demo.csv", "demo.gif", "demo.md", "demo.png"]
     assert sorted(p.name for p in folder.iterdir()) == names
-    assert "DIM, paper's gate" in out
+    assert "DIM, harmonious gate" in out
     points = pd.read_csv(folder / "demo.csv")
     assert {*points["controller"]} == {"dim", "dim:gate=harmonious", "fixed-time"}
     assert {*points["density"]} == {150.0, 350.0}
