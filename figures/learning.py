@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from figures import plots, style
 from figures.tables import Table
@@ -28,6 +29,7 @@ def learning_figure(training: Training, rows: pd.DataFrame) -> Figure:
     left.plot(number, gained, color=style.FAINT, linewidth=1.0)
     left.plot(number[width - 1 :], smooth, color=style.BLUE, linewidth=2.0)
     left.axhline(0.0, color=style.INK, linewidth=0.8)
+    left.xaxis.set_major_locator(MaxNLocator(integer=True))
     style.plot_axes(left, "Training", "generation", "median less the start policy [s/vehicle]")
     names = list(dict.fromkeys(rows["controller"]))
     colours = (style.BLUE, style.SKY, style.VERMILLION, style.ORANGE, style.PURPLE, style.GREEN)
