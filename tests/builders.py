@@ -310,6 +310,9 @@ CURVES = {
     "fixed-time": (8.0, 400.0), "adaptive": (5.0, 450.0), "v2ic": (0.1, 480.0),
     "all-way-stop": (1.5, 550.0), "schedule": (0.1, 700.0),
     "reservation": (0.3, 600.0), "max-pressure": (4.0, 460.0),
+    "unregulated": (0.1, 900.0), "dim without conflicts": (0.3, 800.0),
+    "dim:gate=passed": (0.4, 540.0), "dim:gate=passed,priorities=waiting": (0.4, 560.0),
+    "dim:gate=harmonious,priorities=waiting": (0.4, 530.0),
 }  # fmt: skip
 
 
@@ -356,7 +359,7 @@ def synthetic_row(experiment: Recipe) -> dict[str, Any]:
         **identity_of(experiment), "trips": trips, "unfinished": 9, "collisions": 0, **times,
         **{f"complete_{key}": value for key, value in times.items()},
         **lanes, **tally(experiment, trips), "queue_growth": excess, "growing": excess > 0.0,
-        "least_delay_s": 2.0, "above_least_percent": 50.0 * waiting,
+        "least_delay_s": 2.0, "delay_s": 2.0 + waiting, "above_least_percent": 50.0 * waiting,
         "arrivals": "same", "cpu_s": 0.1, "version": "test", "error": None,
     }  # fmt: skip
 
