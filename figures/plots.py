@@ -186,7 +186,7 @@ def frame(
     figure: Figure, title: str, looks: Iterable[style.Look], note: str, *,
     ncols: int | None = None, marks: float | None = None, paper: bool = False, lines: bool = True,
 ) -> None:  # fmt: skip
-    """The title of a figure, the legend of its looks in `ncols` columns, and its small print.
+    """The title of a figure, the legend of its looks (if any) in `ncols` columns, and small print.
 
     At the height `marks`, a second legend says what markers and arrows mean, those of the `paper`
     too. Without `lines`, the looks are markers only.
@@ -198,7 +198,8 @@ def frame(
                linestyle=k.dashes if lines else "none")
         for k in shown
     ]  # fmt: skip
-    legend(figure, handles, [k.label for k in shown], 0.93, ncols)
+    if shown:
+        legend(figure, handles, [k.label for k in shown], 0.93, ncols)
     if marks is not None:
         _marks_legend(figure, marks, paper=paper)
     # A letter is about 0.54 times its size in width; an inch has 72 points.

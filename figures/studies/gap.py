@@ -14,7 +14,7 @@ from figures.studies.shared.section import Item, Section
 from figures.tables import Table
 from scenarios.controllers import label_of
 from scenarios.statistics import mean_interval
-from scenarios.studies.gap import PARTS, delays, seconds
+from scenarios.studies.gap import ORDER, PARTS, delays, seconds
 from scenarios.studies.optimum import DENSITIES
 from scenarios.studies.shared.archive import missing_note
 from scenarios.studies.shared.study import Results
@@ -24,9 +24,9 @@ LOOKS = dict(
     zip(
         dict.fromkeys(part.label for parts in PARTS.values() for part in parts),
         (
-            (style.INK, ""), (style.SKY, ""), (style.PURPLE, ""), (style.ORANGE, ""),
-            (style.BLUE, "///"), (style.GREEN, "..."), (style.VERMILLION, "xxx"),
-            (style.FAINT, ""),
+            (style.INK, ""), (style.SKY, ""), (style.PURPLE, "///"), (style.BLACK, "..."),
+            (style.ORANGE, ""), (style.BLUE, "///"), (style.GREEN, "..."),
+            (style.VERMILLION, "xxx"), (style.FAINT, ""),
         ),
         strict=True,
     )
@@ -39,11 +39,11 @@ NOTE = (
 
 
 def gap_figure(results: Results) -> Figure:
-    """The delay of each controller in parts: arms from top to bottom, demands side by side."""
+    """The delay of each controller in parts: a row per junction, the three highest demands."""
     table = delays(results.good)
-    shown = sorted(table.index.unique("density")) or DENSITIES
+    shown = sorted(table.index.unique("density"))[-3:] or DENSITIES[-3:]
     figure, panels = plots.panels(
-        12.0, 6.6, 3 * len(shown), rows=3, left=0.19, right=0.99, top=0.82, bottom=0.105,
+        11.0, 6.6, 3 * len(shown), rows=3, left=0.17, right=0.99, top=0.82, bottom=0.105,
         wspace=0.1, hspace=0.42,
     )  # fmt: skip
     for axes, (arms, density) in zip(panels, product((3, 4, 5), shown), strict=True):
@@ -88,7 +88,7 @@ def gap_table(results: Results) -> Table:
     table, rows = delays(results.good), []
     for arms in (3, 4, 5):
         causes = {
-            (part.label, label_of(name) if part == parts[-1] and name != "reservation" else ""):
+            (part.label, label_of(name) if part.label == ORDER else ""):
             seconds(part, table)
             for name, parts in PARTS.items() for part in parts
         }  # fmt: skip
