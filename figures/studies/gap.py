@@ -33,7 +33,7 @@ LOOKS = dict(
 )  # fmt: skip
 
 NOTE = (
-    "The parts of a bar add up to the delay of its controller (white mark), negative ones to the "
+    "The parts of a bar add up to the delay of its controller (diamond), negative ones to the "
     "left of 0.  Vehicles come for half of that time, and every one counts."
 )
 
