@@ -19,12 +19,12 @@ from scenarios.studies.optimum import DENSITIES
 from scenarios.studies.shared.archive import missing_note
 from scenarios.studies.shared.study import Results
 
-#: Every cause once -> its colour and its hatching, which tell them apart without colour too.
+#: Every cause -> its colour and hatching; the paper's gate has them all.
 LOOKS = dict(
     zip(
-        dict.fromkeys(part.label for parts in PARTS.values() for part in parts),
+        (part.label for part in PARTS["dim"]),
         (
-            (style.INK, ""), (style.SKY, ""), (style.PURPLE, "///"), (style.BLACK, "..."),
+            (style.INK, ""), (style.SKY, ""), (style.PURPLE, "///"), (style.MUTED, "..."),
             (style.ORANGE, ""), (style.BLUE, "///"), (style.GREEN, "..."),
             (style.VERMILLION, "xxx"), (style.FAINT, ""),
         ),
@@ -43,8 +43,8 @@ def gap_figure(results: Results) -> Figure:
     table = delays(results.good)
     shown = sorted(table.index.unique("density"))[-3:] or DENSITIES[-3:]
     figure, panels = plots.panels(
-        11.0, 6.6, 3 * len(shown), rows=3, left=0.17, right=0.99, top=0.82, bottom=0.105,
-        wspace=0.1, hspace=0.42,
+        11.0, 6.6, 3 * len(shown), rows=3, left=0.17, right=0.985, top=0.795, bottom=0.105,
+        wspace=0.1, hspace=0.46,
     )  # fmt: skip
     for axes, (arms, density) in zip(panels, product((3, 4, 5), shown), strict=True):
         _draw(axes, table.query("arms == @arms and density == @density"))
@@ -59,7 +59,7 @@ def gap_figure(results: Results) -> Figure:
         Patch(facecolor=colour, hatch=hatch, edgecolor=style.PAPER, linewidth=0.0)
         for colour, hatch in LOOKS.values()
     ]
-    plots.legend(figure, handles, list(LOOKS), 0.93, 4)
+    plots.legend(figure, handles, list(LOOKS), 0.94, 4, fontsize=8.5)
     return figure
 
 

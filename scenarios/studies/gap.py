@@ -11,6 +11,8 @@ from collections.abc import Mapping
 from itertools import product
 from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
+
 from scenarios.optimum import DELAY, LEAST
 from scenarios.studies.optimum import DENSITIES, HARMLESS, SCHEDULE, DrainedPoint
 from scenarios.studies.shared.study import Study
@@ -86,7 +88,7 @@ def delays(rows: pd.DataFrame) -> pd.DataFrame:
 
 def seconds(part: Part, table: pd.DataFrame) -> pd.Series[float]:
     """The delay that a cause adds [s], row by row of `delays`."""
-    return table[[*part.weights]].mul(part.weights).sum(axis=1)
+    return table[[*part.weights]].mul(np.array([*part.weights.values()])).sum(axis=1)
 
 
 STUDY = Study(
