@@ -187,7 +187,7 @@ def crosses(every: float, **rules: str) -> bool:
 def test_behind_the_harmonious_gate_priorities_decide_only_once_the_junction_is_empty(
     priorities: str,
 ) -> None:
-    """An a2 every 3 s never leaves it empty, one every 3.5 s does (docs/safety.md)."""
+    """An a2 every 3 s never leaves it empty, one every 3.5 s does (docs/background/safety.md)."""
     assert not crosses(3.0, gate="harmonious", priorities=priorities)
     assert crosses(3.5, gate="harmonious", priorities=priorities)
     assert not crosses(3.5, gate="harmonious")
