@@ -35,7 +35,6 @@ from minisim.errors import (
     instance,
     integer,
     number,
-    show,
 )
 from minisim.fleet import Fleet
 from minisim.inflow import MAX_DENSITY
@@ -156,7 +155,7 @@ def check_controller(
     instance("arms", arms, Iterable)
     run = _simulate_in(host)
     try:
-        as_controller(show(controller), controller)
+        as_controller(controller)
     except InputError as error:
         raise ContractError(str(error)) from None
     copy = _check_value(controller)
