@@ -186,7 +186,7 @@ def _outer_class() -> type:
             collects = gc.isenabled()
             gc.disable()
             try:
-                return super().compile(sig)  # type: ignore[no-untyped-call]  # numba has no types
+                return super().compile(sig)
             finally:
                 if collects:
                     gc.enable()
