@@ -11,15 +11,24 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
-from minisim.control import HALTING, Command, Go, Observed, Plan, Site, View, Wake
+from minisim.control import (
+    AT_LINE,
+    HALTING,
+    SUMO_AT_LINE,
+    Command,
+    Go,
+    Observed,
+    Plan,
+    Site,
+    View,
+    Wake,
+)
 from minisim.junction.conflicts import clearing_distances
 from minisim.names import Name
 from minisim.parameters import declared, real
 from minisim.reasons import Reason
 
-#: A vehicle stands at the line when its front is at most this far before it [m].
-LINE = 1.0
-#: How far views reach beyond that [m].
+#: How far views reach beyond where a vehicle stands at the line [m].
 SIGHT_MARGIN = 0.5
 
 
@@ -52,8 +61,7 @@ class AllWayStopSession:
     """
 
     def __init__(self, site: Site, reaction: float) -> None:
-        # SUMO's own vehicles stand a millimetre further off.
-        line = self._line = LINE if site.vehicle.sumo is None else LINE + 0.01
+        line = self._line = AT_LINE if site.vehicle.sumo is None else SUMO_AT_LINE
         self.plan = Plan(marks=(line,), wake_on_clear=True, sight=line + SIGHT_MARGIN)
         self._reaction = reaction
         self._dt = site.dt

@@ -19,14 +19,19 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from baselines.manager import Manager
 from baselines.optimum.alone import drives
 from baselines.ordered import Due, OrderedSession, Times
 from baselines.prediction import Floats
-from baselines.reservation import Manager
+from baselines.promises import passages_of
 from minisim.control import Command, Cover, Observed, Radio, Site, View, stopping_distance
 from minisim.junction.conflicts import conflict_zones
 from minisim.names import Name
 from minisim.parameters import declared, real
+
+#: Vehicles keep to their passages as closely as if the buffer were no longer than this, that of
+#: `baselines.reservation` [s].
+CLOSE = 0.5
 
 #: Least separation of vehicles in conflict [s]: the first one comes before the second.
 LEAST = 0.01
@@ -149,9 +154,9 @@ class FlowSession(OrderedSession):
             buffer = stopping_distance(limit, site.vehicle.deceleration) / limit
         times = Times(separations(site, buffer), (0.0,) * len(ways), ways)
         reach = min(controller.reach, site.intersection.approach_length)
-        super().__init__(Manager(site, buffer), controller.period, reach, site, times)
+        passages = passages_of(Manager(site, buffer), site, controller.period, min(buffer, CLOSE))
+        super().__init__(passages, controller.period, reach, site, times)
         self._rule = controller.rule
-        self._seen: Sequence[Observed] = ()
         self._asked: dict[int, tuple[int, float]] = {}  # how many before it, and when it would come
         self._count = 0  # of those that have asked
         self._planned: list[Served] = []
@@ -160,20 +165,20 @@ class FlowSession(OrderedSession):
 
     def decide(self, view: View) -> Iterable[Command]:
         """Plan, grant and advise; choices stand whose vehicles hold a passage."""
-        self._seen = view.vehicles
         yield from super().decide(view)
         for it in self._planned:
             if it.vehicle.id not in self.manager.slots:
                 break
             self._rule = it.rule
 
-    def _order(self, now: int) -> Iterable[Due]:
+    def _order(self) -> Iterable[Due]:
         """Those that hold a passage, then the others by the rule."""
-        self._ask(now)
+        seen = self.passages.seen
+        self._ask()
         free, clock = np.full(len(self._between), -math.inf), -math.inf
         lines: list[list[Waiting]] = [[] for _ in range(self._lanes)]
         order = []
-        for it in self._seen:
+        for it in seen.values():
             kind = self._kind(it)
             if (slot := self.manager.slots.get(it.id)) is not None:
                 order.append(Due(kind, it))
@@ -183,16 +188,15 @@ class FlowSession(OrderedSession):
             line = lines[it.lane]
             request, came = self._asked[it.id]
             came = max(came, line[-1].came) if line else came
-            line.append(Waiting(it.id, kind, request, came, self._when(it, kind, now)))
+            line.append(Waiting(it.id, kind, request, came, self._when(it, kind)))
         self._planned = list(plan(lines, self._rule, self._between, free, clock))
-        by_id = {it.id: it for it in self._seen}
-        return order + [Due(it.vehicle.kind, by_id[it.vehicle.id]) for it in self._planned]
+        return order + [Due(it.vehicle.kind, seen[it.vehicle.id]) for it in self._planned]
 
-    def _ask(self, now: int) -> None:
+    def _ask(self) -> None:
         """Note new vehicles, the nearest first."""
-        new = [it for it in self._seen if it.id not in self._asked]
+        new = [it for it in self.passages.seen.values() if it.id not in self._asked]
         for it in sorted(new, key=lambda it: (it.distance, it.lane)):
-            self._asked[it.id] = self._count, self._when(it, self._kind(it), now)
+            self._asked[it.id] = self._count, self._when(it, self._kind(it))
             self._count += 1
 
     def _kind(self, it: Observed) -> int:

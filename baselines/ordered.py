@@ -2,8 +2,8 @@
 
 A vehicle gets the right of way when all that are before it in the order and conflict with it have
 theirs, and its passage, predicted by its law, fits theirs. Until then it drives as slowly as makes
-it come in time, so that it crosses at full speed. The rest is the protocol of
-`baselines.reservation`, which keeps it safe. Where the order comes from is left to each session.
+it come in time, so that it crosses at full speed. The rest is `baselines.passages`,
+which keeps it safe. Where the order comes from is left to each session.
 """
 
 from __future__ import annotations
@@ -15,10 +15,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from baselines.manager import Slot
 from baselines.optimum.alone import Drive
+from baselines.passages import Passages, PassageSession
 from baselines.prediction import Floats
-from baselines.reservation import Manager, Reservation, ReservationSession, Slot
-from minisim.control import Advise, Command, Observed, Plan, Site, View
+from minisim.control import Command, Observed, Plan, Site, View
 from minisim.reasons import Reason
 
 #: Slowest advice [m/s], and how fast a vehicle accelerates on its way to the junction, as a share
@@ -46,15 +47,13 @@ class Times(NamedTuple):
     drives: Sequence[Drive]  #: of each kind, alone
 
 
-class OrderedSession(ReservationSession):
+class OrderedSession(PassageSession):
     """One run: grants passages in an order, and slows the others down in time."""
 
     def __init__(
-        self, manager: Manager, period: float, reach: float, site: Site, times: Times
+        self, passages: Passages, period: float, reach: float, site: Site, times: Times
     ) -> None:
-        super().__init__(Reservation(period=period), site)
-        self.manager, self.plan = manager, Plan(marks=(reach,), sight=reach)
-        self._advice: list[Command] = []
+        super().__init__(passages, Plan(marks=(reach,), sight=reach), period, site)
         self._due: dict[int, tuple[int, float]] = {}  # kinds and times at the mark [s], in order
         self._alone: dict[int, float] = {}  # when each passes its mark if it drives on alone [s]
         self._between, self._past, ways = times
@@ -66,64 +65,61 @@ class OrderedSession(ReservationSession):
         self._limit, self._types = site.limit, site.types
 
     @abstractmethod
-    def _order(self, now: int) -> Iterable[Due]:
+    def _order(self) -> Iterable[Due]:
         """All vehicles in view, and what is before them, in their order."""
 
     def decide(self, view: View) -> Iterable[Command]:
-        """Check the passages, grant new ones in order, and advise the others."""
-        self._advice, self._alone, self._due = [], {}, {}
-        return [*super().decide(view), *self._advice]
+        """Review the passages, give new ones in order, and advise the others."""
+        self._alone, self._due = {}, {}
+        return super().decide(view)
 
-    def _grant(self, seen: dict[int, Observed], ahead: dict[int, int], now: int) -> Iterator[int]:  # noqa: ARG002
-        """Grant passages in order; return the ids of the new holders."""
+    def _grant(self) -> Iterator[Command]:
+        """Give passages in order."""
+        passages, slots = self.passages, self.manager.slots
         free, blocked = np.full(len(self._between), -math.inf), np.zeros(len(self._between), bool)
-        for kind, me, time in self._order(now):
+        for kind, me, time in self._order():
             held = True
             if me is not None:
-                slot = self.manager.slots.get(me.id)
+                slot = slots.get(me.id)
                 held = slot is None
                 if slot is None:
-                    alone = self._when(me, kind, now)
+                    alone = self._when(me, kind)
                     time = max(alone, float(free[kind]))
                     if not blocked[kind] and time - alone < EARLY:
-                        slot = self._passage(me, now, ahead.get(me.id))
+                        slot = self._passage(me.id)
                         time = max(time, alone + AGAIN)
                 if slot is not None:
                     time = self._at_mark(slot, kind)
                     if held:
-                        yield me.id
-                        self._advice.append(Advise(me.id, math.inf))
+                        yield passages.give(slot)
+                        yield from passages.advise(me.id, math.inf)
                     held = False
                 else:
-                    speed = self._speed(me, kind, time - now * self._dt)
-                    self._advice.append(Advise(me.id, speed))
-            if me is not None:
+                    left = time - passages.since(me.id) * self._dt
+                    yield from passages.advise(me.id, self._speed(me, kind, left))
                 self._due[me.id] = kind, time
             if held:
                 blocked |= self._conflict[kind]
             free = np.maximum(free, time + self._between[kind])
 
-    def _waits(self, me: Observed, leader: int | None) -> Reason:  # noqa: ARG002  (the session's)
+    def _waits(self, vehicle: int) -> Reason:
         """When a vehicle is to pass, and after which vehicles in view."""
-        own, until = self._due[me.id]
-        before = list(self._due)[: list(self._due).index(me.id)]
+        own, until = self._due[vehicle]
+        before = list(self._due)[: list(self._due).index(vehicle)]
         others = tuple(v for v in before if self._crosses[own, self._due[v][0]])
-        return Reason("after" if others else "planned", me.id, others, until=until)
+        return Reason("after" if others else "planned", vehicle, others, until=until)
 
-    def _when(self, me: Observed, kind: int, now: int) -> float:
+    def _when(self, me: Observed, kind: int) -> float:
         """When a vehicle passes its mark if it drives on alone [s]."""
         if me.id not in self._alone:
-            self._alone[me.id] = self.manager.alone(me, now, self._marks[kind]) * self._dt
+            since = self.passages.since(me.id)
+            self._alone[me.id] = self.manager.alone(me, since, self._marks[kind]) * self._dt
         return self._alone[me.id]
 
-    def _passage(self, me: Observed, now: int, leader: int | None) -> Slot | None:
-        """A vehicle's passage if it fits all others; then it holds it."""
-        slot = self._predict(me, now, leader)
-        if slot is None or not self.manager.fits(slot, last=True):
-            return None
-        self.manager.slots[me.id] = slot
-        self._requests.pop(me.id, None)
-        return slot
+    def _passage(self, vehicle: int) -> Slot | None:
+        """A vehicle's passage if it fits all others."""
+        slot = self.passages.ask(vehicle)
+        return slot if slot is not None and self.manager.fits(slot, last=True) else None
 
     def _at_mark(self, slot: Slot, kind: int) -> float:
         return (slot.start + int(slot.s.searchsorted(self._marks[kind]))) * self._dt

@@ -22,13 +22,12 @@ from minisim.laws import (
     braking_begins,
     build_law,
     closeness,
-    follow,
+    drive,
     hold,
     keep_room,
     room_behind,
     short_of,
     slow_down,
-    within,
 )
 
 Floats = npt.NDArray[np.float64]
@@ -101,11 +100,13 @@ class Motion(NamedTuple):
 def predict(
     law: Law, me: Traits, course: Course, position: float, speed: float,
     *, lane: Sequence[Leader] = (), exit_lane: Sequence[Leader] = (), held: int = 0,
+    advice: float = math.inf,
 ) -> Motion | None:  # fmt: skip
     """The motion of a vehicle until it arrives, if it may drive on; None if it hits a leader.
 
-    For its first `held` steps it has to stop at the junction entry. `lane` holds the vehicles
-    ahead, nearest first; `exit_lane` those that enter that lane earlier.
+    For its first `held` steps it has to stop at the junction entry, and keeps to an advised speed
+    [m/s]. `lane` holds the vehicles ahead, nearest first; `exit_lane` those that enter that lane
+    earlier.
     """
     ahead = _stacked(lane, [leader.until for leader in lane])
     entering = _stacked(exit_lane, [leader.shift for leader in exit_lane])
@@ -113,7 +114,7 @@ def predict(
     while count == UNFINISHED:  # it ends: every leader arrives, and a free road is driven on
         steps *= 2
         s, v = np.empty(steps), np.empty(steps)
-        count, hard = _drive(law, me, course, position, speed, ahead, entering, held, s, v)
+        count, hard = _drive(law, me, course, position, speed, ahead, entering, held, advice, s, v)
     return Motion(s[:count].copy(), v[:count].copy(), hard) if count else None
 
 
@@ -131,7 +132,7 @@ def _stacked(leaders: Sequence[Leader], bound: list[float]) -> Leaders:
 @njit
 def _drive(
     law: Law, me: Traits, course: Course, position: float, speed: float,
-    lane: Leaders, exit_lane: Leaders, held: int, s_out: Floats, v_out: Floats,
+    lane: Leaders, exit_lane: Leaders, held: int, advice: float, s_out: Floats, v_out: Floats,
 ) -> tuple[int, bool]:  # fmt: skip
     """Fill `s_out` and `v_out` as `minisim.engine.kernel` would drive the vehicle.
 
@@ -175,7 +176,7 @@ def _drive(
                             room = min(room, behind_it)
                     break
         v0 = course.before if s < 0.0 else course.turn if s < course.crossing else course.behind
-        acc = within(v, follow(v, v0, max(z, z_exit), me, law), v0, law)
+        acc = drive(v, v0, advice if k < held else math.inf, max(z, z_exit), me, law)
         if z_exit > z and acc < -me.b:
             hard = True
         if s < 0.0 and braking_begins(v, -s, me, law):

@@ -31,8 +31,11 @@ myst_heading_anchors = 4
 nb_execution_mode = "force"  # what a lesson prints is that of the present code
 nb_execution_raise_on_error = True
 nb_execution_timeout = 120
+nb_merge_streams = True  # what a cell prints is one block
 
 html_theme = "furo"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
 html_title = f"minisim {__version__}"
 html_math_renderer = "mathml"  # Sphinx's own renderers load MathJax from the net, or need LaTeX
 

@@ -22,7 +22,6 @@ from scenarios.benchmark.ranking import (
     scores,
 )
 from scenarios.benchmark.results import Result
-from scenarios.controllers import label_of
 from scenarios.optimum import ABOVE
 from scenarios.statistics import Interval, mean_interval
 
@@ -78,8 +77,8 @@ def overall_figure(result: Result) -> Figure:
     style.write(figure, (left + 5.5) / width, 1.0 - 0.5 / high, "rank", 9.5, bold=True)
     note = (
         f"{_extent(result)}  Geometric mean over {plural(len(result.plain), 'cell')} without "
-        "errors and humans; 95 % intervals over seeds. In brackets the ranks that are possible, "
-        "with 95 % confidence for all together."
+        "errors, lost messages and humans; 95 % intervals over seeds. In brackets the ranks that "
+        "are possible, with 95 % confidence for all together."
     )
     _framed(figure, titled(result, "overall"), note)
     return figure
@@ -203,7 +202,7 @@ def _mean(values: pd.Series[Any]) -> float:
 
 def label(name: str) -> str:
     """What figures and tables call a controller."""
-    return "schedule (knows all arrivals)" if name == SCHEDULE else label_of(name)
+    return style.look(name).label
 
 
 def _margin(order: Iterable[str]) -> float:

@@ -86,7 +86,7 @@ def _report(result: Result, facts: str, drawn: Iterable[str]) -> Iterator[str]:
     yield (
         "All controllers have the same arrivals. A run goes on until its last vehicle has arrived, "
         "and every vehicle counts. The least delay is a bound that no controller can beat "
-        "(docs/optimum.md); the schedule knows all arrivals beforehand. "
+        "(docs/howto/optimum.md); the schedule knows all arrivals beforehand. "
         f"`{FILE}` has every row: compare it with another one by `minisim benchmark --compare`."
     )
     for cell, why in head["no_least"].items():
@@ -104,7 +104,8 @@ def _overall_table(standings: Mapping[str, Standing]) -> Table:
         return f"{low:.2f} to {high:.2f}" if it.size > 1 else "–"
 
     return Table(
-        "Times the least delay, geometric mean over the cells without errors and humans",
+        "Times the least delay, geometric mean over the cells without errors, lost messages and "
+        "humans",
         ("controller", "rank", "times the least", "95 % interval"),
         tuple(
             (label(name), it.words, f"{math.exp(it.mean.mean):.2f}", interval(it.mean))

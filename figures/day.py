@@ -31,7 +31,7 @@ def day_figure(runs: Mapping[str, Run], interval: float = 900.0) -> Figure:
     """How many vehicles came in each `interval` [s], and their mean waiting and control delay.
 
     `runs` maps names to runs of one demand. Names of controllers have the same look as in other
-    figures; other variants of these have the same colour.
+    figures; other variants of these have its colour, other dashes, and their place for a marker.
     """
     figure, panels = plots.panels(
         12.0, 4.4, 3, sharey=False, left=0.05, right=0.97, top=0.77, bottom=0.2, wspace=0.2
@@ -68,8 +68,10 @@ def _looks(names: Iterable[str]) -> list[style.Look]:
     return [
         style.look(name)
         if name in VARIANTS
-        else style.look(name.partition(":")[0])._replace(label=name, dashes=next(strokes))
-        for name in names
+        else style.look(name.partition(":")[0])._replace(
+            label=name, dashes=next(strokes), marker=f"${place}$"
+        )
+        for place, name in enumerate(names, start=1)
     ]
 
 

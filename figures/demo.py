@@ -7,7 +7,6 @@ from matplotlib.figure import Figure
 
 from figures import plots, style
 from minisim.results.metrics import METRICS
-from scenarios.demo import CONTROLLERS
 
 PANELS = ("waiting_time_s", "travel_time_s")
 
@@ -22,7 +21,6 @@ def performance_figure(points: pd.DataFrame, title: str = "") -> Figure:
         lines = []
         for name, line in points.groupby("controller", sort=False):
             look = style.look(str(name))
-            look = look._replace(label=CONTROLLERS.get(str(name), look.label))
             low, high = (line[metric] + sign * line[f"{metric}_ci95"] for sign in (-1, 1))
             means = map(plots.Estimate, line[metric], low, high)
             lines.append((look, dict(zip(line["density"], means, strict=True))))

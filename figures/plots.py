@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,6 +24,8 @@ from scenarios.sweep.cells import saturated
 SPREAD = 0.12
 #: Lines with few points are this far apart [veh/h/lane].
 DODGE = 2.5
+#: Series that a panel shows for comparison only.
+OTHERS = style.Look("the others", "#BCC3CC", "", "-")
 DENSITY_LABEL = "demand [veh/h/lane]"
 #: Left edge of titles, legends and small print, as a share of the figure.
 LEFT = 0.012
@@ -83,20 +85,29 @@ def draw_side_by_side(
     style.plot_axes(axes, title, "density [veh/h/lane]", "mean [s]")
 
 
-def draw_means(axes: Axes, rows: pd.DataFrame, metric: str, series: Sequence[str]) -> None:
+def draw_means(
+    axes: Axes, rows: pd.DataFrame, metric: str, series: Sequence[str],
+    others: Collection[str] = (),
+) -> None:  # fmt: skip
     """One line per series over demand: mean over seeds, interval, arrows at growing queues.
 
-    `rows` come from a study (`Results.good`); a series without rows is left out.
+    `rows` come from a study (`Results.good`); a series without rows is left out. The means of
+    `others` are pale lines behind them.
     """
     if rows.empty:
         axes.text(0.5, 0.94, "not run", transform=axes.transAxes, ha="center", va="top",
                   fontsize=11, color=style.MUTED)  # fmt: skip
         return
+    known = rows[rows[metric].notna()]
+    behind = known[known["series"].isin([*others]) & ~known["series"].isin(series)]
+    for _, line in behind.groupby("series"):
+        means = line.groupby("density")[metric].mean()
+        axes.plot(means.index, means, OTHERS.dashes, color=OTHERS.colour, linewidth=1.0, zorder=1)
     for place, name in enumerate(series):
-        known = rows[(rows["series"] == name) & rows[metric].notna()]
-        if not known.empty:
+        mine = known[known["series"] == name]
+        if not mine.empty:
             shift = offset(rows, place, len(series))
-            draw_over(axes, known, "density", metric, style.look(name), 1.0, shift)
+            draw_over(axes, mine, "density", metric, style.look(name), 1.0, shift)
 
 
 def draw_over(
@@ -126,7 +137,9 @@ def draw_published(
         drawn: dict[str, Any] = {
             "color": look.colour, "markeredgewidth": 1.2, "linestyle": "none", "zorder": 5
         }  # fmt: skip
-        axes.plot(x, chosen["paper"], look.marker, markersize=8.0, markerfacecolor="none", **drawn)
+        axes.plot(
+            x, chosen["paper"], marker=look.marker, markersize=8.0, markerfacecolor="none", **drawn
+        )
         crossed = (chosen["comparable"] != "yes").to_numpy()
         axes.plot(x[crossed], chosen["paper"][crossed], "x", markersize=7.0, **drawn)
 
@@ -193,12 +206,8 @@ def frame(
     """
     style.write(figure, LEFT, 0.965, title, 13, bold=True)
     shown = list(looks)
-    handles = [
-        Line2D([], [], color=k.colour, marker=k.marker, linewidth=1.7, markersize=5.5,
-               linestyle=k.dashes if lines else "none")
-        for k in shown
-    ]  # fmt: skip
-    legend(figure, handles, [k.label for k in shown], 0.93, ncols)
+    if shown:
+        legend(figure, [key(k, lines=lines) for k in shown], [k.label for k in shown], 0.93, ncols)
     if marks is not None:
         _marks_legend(figure, marks, paper=paper)
     # A letter is about 0.54 times its size in width; an inch has 72 points.
@@ -206,6 +215,14 @@ def frame(
     figure.text(
         LEFT, 0.008, textwrap.fill(note, columns), fontsize=FOOTNOTE_SIZE, color=style.MUTED,
         va="bottom", linespacing=1.05,
+    )  # fmt: skip
+
+
+def key(look: style.Look, *, lines: bool = True) -> Line2D:
+    """A look as legends show it; without `lines`, its marker only."""
+    return Line2D(
+        [], [], color=look.colour, marker=look.marker, linewidth=1.7, markersize=5.5,
+        linestyle=look.dashes if lines else "none",
     )  # fmt: skip
 
 

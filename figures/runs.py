@@ -14,6 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
 
 from figures import style
 from figures.whole import filmed, head_spans, whole
@@ -101,6 +102,7 @@ def queues(run: Run, *, ax: Axes | None = None) -> Figure:
         axes.plot(time, lengths[:, lane], color=colour, linestyle=dashes, linewidth=1.4,
                   drawstyle="steps-post", label=f"lane {ARM_NAMES[lane]}")  # fmt: skip
     axes.set_ylim(bottom=0.0)
+    axes.yaxis.set_major_locator(MaxNLocator(integer=True))
     axes.margins(x=0.0)
     what = f"slower than {3.6 * JAM_SPEED:g} km/h for {JAM_TIME:g} s, or waiting before the road"
     style.plot_axes(axes, "Queues", f"time [s]; in the queue: {what}", "vehicles in the queue")

@@ -1,8 +1,9 @@
 """One look for every figure: colours, type and the bare figure.
 
 The colours are Okabe & Ito's (jfly.uni-koeln.de/color, 2008), which colour-blind readers can tell
-apart. Figures are made from matplotlib's objects, without pyplot, so nothing here touches global
-state, a display or another program's figures.
+apart, and Tol's indigo (personal.sron.nl/~pault), which is as far from all of them. Figures are
+made from matplotlib's objects, without pyplot, so nothing here touches global state, a display or
+another program's figures.
 """
 
 from __future__ import annotations
@@ -52,14 +53,19 @@ HEADS = {
 #: Colours by their names in the table of controllers.
 COLOURS = {
     "blue": BLUE, "sky": SKY, "green": GREEN, "vermillion": VERMILLION, "orange": ORANGE,
-    "purple": PURPLE, "brown": "#7A4A1E", "ink": INK, "grey": FREE,
+    "purple": PURPLE, "indigo": "#332288", "brown": "#7A4A1E", "ink": INK, "grey": FREE,
 }  # fmt: skip
 
-#: Series that are not controllers: DIM by the number of arms.
+#: By the number of arms.
 ARMS = {
-    "dim-3": Look("3 arms", "green", "^", "--"),
-    "dim-4": Look("4 arms", "blue", "o", "-"),
-    "dim-5": Look("5 arms", "vermillion", "p", "-."),
+    3: Look("3 arms", "green", "^", "--"), 4: Look("4 arms", "blue", "o", "-"),
+    5: Look("5 arms", "vermillion", "p", "-."), 6: Look("6 arms", "ink", "h", ":"),
+}  # fmt: skip
+
+#: Series that are no controllers of the table: DIM by the number of arms, and the optimum's.
+SERIES = {
+    **{f"dim-{arms}": look for arms, look in ARMS.items()},
+    "schedule": Look("schedule (knows all arrivals)", "grey", ".", "-."),
 }
 
 #: Font of an axis label.
@@ -69,10 +75,14 @@ FORMATS = ("png", "pdf", "svg")
 
 
 def look(series: str) -> Look:
-    """The look of a series, with its colour in matplotlib's form; grey for an unknown one."""
-    variant = VARIANTS.get(series)
-    known = ARMS.get(series) or (variant and variant.look) or Look(series, "grey", "h", "-")
-    return known._replace(colour=COLOURS[known.colour])
+    """The look of a series, as `coloured` gives it; grey for an unknown one."""
+    known = VARIANTS[series].look if series in VARIANTS else SERIES.get(series)
+    return coloured(known or Look(series, "grey", "$?$", ":"))
+
+
+def coloured(look: Look) -> Look:
+    """A look with its colour in matplotlib's form, in which it may be already."""
+    return look._replace(colour=COLOURS.get(look.colour, look.colour))
 
 
 class ShownFigure(Figure):

@@ -16,22 +16,17 @@ import numpy as np
 from minisim.arrivals import Arrivals
 from minisim.control import (
     NO_REPORTS,
-    Advise,
-    Brake,
-    Close,
     Command,
     Controller,
     Counting,
-    Go,
-    Hold,
     Kinds,
-    Open,
     Plan,
     Session,
     Site,
     View,
     Wake,
     as_controller,
+    check_command,
     keeps,
 )
 from minisim.engine.collision import Collision
@@ -62,9 +57,6 @@ REACTIONS = (*ON_COLLISION, "teleport")
 NEEDED = (
     "name", "profile_name", "density", "horizon", "warmup", "depart_speed", "site", "arrivals",
 )  # fmt: skip
-
-#: Commands by what they address. Building a union of types at each check would be slow.
-TO_VEHICLES, TO_LANES = (Go, Hold, Advise, Brake), (Open, Close)
 
 #: How long a replay goes on after the collision [s].
 AFTERMATH = 2.0
@@ -300,21 +292,3 @@ def checked_window(window: object) -> tuple[float, float]:
         raise InputError(f"record_window must be (from, to) in seconds, got {show(window)}")
     start, end = number("start of record_window [s]", window[0], low=0), window[1]
     return start, end if end == math.inf else number("end of record_window [s]", end, low=start)
-
-
-def check_command(command: Command, tick: int, site: Site, vehicles: int | None = None) -> None:
-    """Raise `InputError` for what is not a command, or one that cannot be carried out at `tick`."""
-    if isinstance(command, TO_VEHICLES):
-        integer("vehicle", command.vehicle, low=0, high=vehicles and vehicles - 1)
-        if isinstance(command, Advise) and command.speed != math.inf:
-            number("advised speed [m/s]", command.speed, low=0)
-        if isinstance(command, Brake):
-            number("deceleration to brake at [m/s²]", command.deceleration, low=0)
-    elif isinstance(command, TO_LANES):
-        integer("lane", command.lane, low=0, high=site.intersection.n - 1)
-    elif isinstance(command, Wake):
-        if first_tick(number("wake-up time [s]", command.time), site.dt) <= tick:
-            now = time_of(tick, site.dt)
-            raise InputError(f"wake-up time {command.time:g} s is not after {now:g} s")
-    else:
-        raise InputError(f"{show(command)} is not a command")

@@ -231,6 +231,19 @@ def drive(v: float, limit: float, advice: float, z: float, me: Traits, law: Law)
     return acc
 
 
+@njit_inner
+def obey(told: float, v: float, limit: float, z: float, me: Traits, law: Law) -> float:
+    """The acceleration of a vehicle whose acceleration a command sets to `told`.
+
+    The command takes the place of the law's wish. So the law is asked as on a road without a limit,
+    and the vehicle drives up to its limit without slowing down before. Above it, it brakes at b.
+    """
+    acc = min(max(told, 0.0) if v == 0.0 else told, follow(v, math.inf, z, me, law))
+    if v + acc * law.dt > limit:
+        acc = min(acc, max((limit - v) / law.dt, -me.b))
+    return acc
+
+
 @njit_inline
 def within(v: float, acc: float, limit: float, law: Law) -> float:
     """`acc`, unless a step of it would take a vehicle past its speed limit.

@@ -12,7 +12,19 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
-from minisim.control import Advise, Close, Command, Go, Hold, Observed, Open, Session, Site, View
+from minisim.control import (
+    Accelerate,
+    Advise,
+    Close,
+    Command,
+    Go,
+    Hold,
+    Observed,
+    Open,
+    Session,
+    Site,
+    View,
+)
 
 #: Each kind of reason, and the sentence that says it of a vehicle.
 KINDS: Mapping[str, str] = {
@@ -25,6 +37,7 @@ KINDS: Mapping[str, str] = {
     "crossing": "Vehicle {me} is crossing the junction.",
     "goes": "Vehicle {me} has the right of way.",
     "advised": "Vehicle {me} is told to drive at {note} at most.",
+    "told": "Vehicle {me} is told to accelerate at {note}.",
     "clique goes": "Vehicle {me} has the right of way with its clique, {clique}. {note}",
     "committed": "Vehicle {me} can no longer stop before the junction, so it goes on.",
     "held": "Vehicle {me} does not have the right of way.",
@@ -160,6 +173,7 @@ class Witness:
             self._open.update(range(site.intersection.n))
         self._gone: set[int] = set()  # vehicles
         self._advice: dict[int, float] = {}  # [m/s]
+        self._told: dict[int, float] = {}  # [m/s²]
         self._last: dict[int, Reason] = {}
         self._heads: list[str] = []
         self._turned: dict[int, float] = {}  # lane: when its head turned to what it shows [s]
@@ -174,6 +188,8 @@ class Witness:
                     self._gone.discard(vehicle)
                 case Advise(vehicle, speed):
                     self._advice[vehicle] = speed
+                case Accelerate(vehicle, acceleration):
+                    self._told[vehicle] = acceleration
                 case Open(lane):
                     self._open.add(lane)
                 case Close(lane):
@@ -212,6 +228,8 @@ class Witness:
         if self._may_go(me):
             if (speed := self._advice.get(me.id, math.inf)) < math.inf:
                 return Reason("advised", me.id, note=f"{speed:.1f} m/s")
+            if (rate := self._told.get(me.id, math.inf)) < math.inf:
+                return Reason("told", me.id, note=f"{rate:.1f} m/s²")
             return Reason("goes", me.id)
         if ahead is not None:
             return Reason("behind", me.id, (ahead,))

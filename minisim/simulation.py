@@ -10,6 +10,7 @@ from functools import partial
 import numpy as np
 
 from minisim.control import (
+    Accelerate,
     Advise,
     Brake,
     Close,
@@ -177,6 +178,8 @@ class Simulation(Stepped):
                 limited = min(asked, float(self._vehicles["b_max"][self._row[vehicle]]))
                 brake = -limited if limited > 0.0 else math.inf
                 self._vehicles["brake"][self._row[vehicle]] = brake
+            case Accelerate(vehicle, told) if not self._vehicles["cleared"][self._row[vehicle]]:
+                self._vehicles["told"][self._row[vehicle]] = told
             case Go(vehicle) | Hold(vehicle):
                 self._vehicles["go"][self._row[vehicle]] = isinstance(command, Go)
             case Open(lane, amber):

@@ -2,29 +2,23 @@
 
 from __future__ import annotations
 
-import math
 import pickle
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal, NamedTuple, get_args
+from typing import Any, Literal, NamedTuple
 
 from minisim.arrivals import Arrivals
 from minisim.control import (
-    Advise,
-    Brake,
-    Close,
+    TO_VEHICLES,
     Command,
     Controller,
-    Go,
-    Hold,
-    Open,
     Plan,
     Session,
     Site,
     View,
-    Wake,
     as_controller,
+    check_command,
 )
 from minisim.demand import Demand
 from minisim.errors import (
@@ -43,6 +37,7 @@ from minisim.junction.movements import ARM_NAMES
 from minisim.parameters import Reals, declared, part, real, reals, text, word
 from minisim.results.run import Run
 from minisim.simulation import simulate
+from minisim.ticks import first_tick
 from minisim.vehicle import VehicleType
 
 #: Time allowed per vehicle after the demand has ended, and to drive the roads [s]. An all-way stop,
@@ -192,24 +187,12 @@ def check_commands(commands: Iterable[Command], view: View, site: Site) -> None:
     """
     ids = {vehicle.id for vehicle in view.vehicles}
     for command in commands:
-        problem = _problem(command, ids, view.time, site.intersection.n)
-        if problem:
-            raise ContractError(f"at {view.time:.1f} s: {command!r}: {problem}")
-
-
-def _problem(command: object, ids: set[int], now: float, lanes: int) -> str | None:
-    match command:
-        case Go() | Hold() | Advise() | Brake() if command.vehicle not in ids:
-            return "this vehicle is not in the view"
-        case Open(lane) | Close(lane) if lane not in range(lanes):
-            return f"there is no such lane (0 … {lanes - 1})"
-        case Advise(_, speed) if not speed >= 0.0:
-            return "a speed must be at least 0 m/s"
-        case Brake(_, deceleration) if not 0.0 <= deceleration < math.inf:
-            return "a deceleration must be a number of at least 0 m/s²"
-        case Wake(time) if not now < time < math.inf:
-            return "a wake-up must be in the future"
-    return None if isinstance(command, get_args(Command)) else "this is not a command"
+        try:
+            check_command(command, first_tick(view.time, site.dt), site)
+            if isinstance(command, TO_VEHICLES) and command.vehicle not in ids:
+                raise InputError("this vehicle is not in the view")
+        except InputError as error:
+            raise ContractError(f"at {view.time:.1f} s: {command!r}: {error}") from None
 
 
 @dataclass(frozen=True)

@@ -29,20 +29,28 @@ from scenarios.profiles import AS_RUN, Profile, profile_named
 
 
 class Look(NamedTuple):
-    """How a series is drawn in every figure; any two looks also differ in greyscale."""
+    """How a series is drawn in every figure.
+
+    No two controllers share a marker. Those whose colours look alike, to colour-blind readers too,
+    differ in their dashes as well.
+    """
 
     label: str
     colour: str  # its name in `figures.style.COLOURS`
-    marker: str
+    marker: str | tuple[int, Literal[1], int]  # as in matplotlib: a character, or a star
     dashes: Literal["-", "--", "-.", ":"]
 
 
 class Variant(NamedTuple):
     """A controller with some of its parameters, as studies compare it."""
 
-    arguments: str = ""  # those that differ from the defaults, as written in a spec
-    look: Look | None = None  # in figures; None means grey
+    arguments: str  # those that differ from the defaults, as written in a spec
+    look: Look  # in figures
     rival: bool = False  # whether it is compared with all others on equal terms
+
+
+#: What a controller needs; figures of many controllers have a row of panels for each.
+BARE, SIGNALS, RADIO = "neither signals nor messages", "signals", "messages by radio"
 
 
 class Entry(NamedTuple):
@@ -50,7 +58,8 @@ class Entry(NamedTuple):
 
     name: str  # without parameters
     where: str  # module and class, which is loaded on use
-    variants: tuple[Variant, ...] = (Variant(),)  # those that have a look or are rivals
+    needs: str  # one of `BARE`, `SIGNALS`, `RADIO`
+    variants: tuple[Variant, ...]  # those that have a look
     as_run: str = ""  # what the bare name means under the profile `as_run`, if different
 
     @property
@@ -60,48 +69,59 @@ class Entry(NamedTuple):
         return getattr(import_module(module), name)  # type: ignore[no-any-return]
 
 
-def _rival(*look: Any) -> tuple[Variant]:
-    return (Variant("", Look(*look), rival=True),)
+def _plain(*look: Any, rival: bool = True) -> tuple[Variant]:
+    return (Variant("", Look(*look), rival),)
 
 
 #: Our controllers, the paper's four first; figures show rivals in this order.
 CONTROLLERS: Mapping[str, Entry] = MappingProxyType({
     entry.name: entry
     for entry in (
-        Entry("dim", "dim:Dim", (
+        Entry("dim", "dim:Dim", BARE, (
             Variant("", Look("DIM", "blue", "o", "-"), rival=True),
             Variant("gate=harmonious", Look("DIM, harmonious gate", "sky", "p", "-"), rival=True),
-            Variant("gate=passed", Look("DIM, gate passed", "ink", "<", "-")),
-            Variant("order=lanes", Look("DIM, lanes first", "green", ">", "--")),
-            Variant("priorities=rotating", Look("DIM, rotating priority", "vermillion", "P", "--")),
-            Variant("priorities=waiting", Look("DIM, longest-waiting priority", "green", "*", ":")),
-            Variant("order=lanes,priorities=waiting"),
-            Variant("monitor=on", Look("DIM with safety monitor", "purple", "H", "-.")),
+            Variant("gate=passed", Look("DIM, gate passed", "indigo", ">", "--"), rival=True),
+            Variant("order=lanes", Look("DIM, lanes first", "green", (3, 1, 180), "--")),
+            Variant("priorities=rotating", Look("DIM, rotating priority", "orange", "8", "-.")),
+            Variant("priorities=waiting",
+                    Look("DIM, longest-waiting priority", "green", (3, 1, 0), ":")),
+            Variant("order=lanes,priorities=waiting",
+                    Look("DIM, lanes first by waiting", "indigo", (4, 1, 45), "-.")),
+            Variant("monitor=on", Look("DIM with safety monitor", "blue", "H", "-.")),
         ), as_run="dim-as-run"),
-        Entry("fixed-time", "baselines:FixedTime", (
+        Entry("fixed-time", "baselines:FixedTime", SIGNALS, (
             Variant("", Look("fixed-time signal", "vermillion", "s", "--"), rival=True),
-            Variant("facing=true", Look("two-phase signal", "vermillion", "d", ":")),
+            Variant("facing=true", Look("two-phase signal", "vermillion", "d", ":"), rival=True),
         )),
-        Entry("adaptive", "baselines:Adaptive", _rival("adaptive signal", "orange", "^", "-.")),
-        Entry("v2ic", "baselines:V2IC", _rival("V2I-C", "green", "D", ":"), as_run="v2ic-as-run"),
-        Entry("all-way-stop", "baselines:AllWayStop", _rival("all-way stop", "ink", "X", "--")),
-        Entry("reservation", "baselines:Reservation", _rival("reservation", "purple", "v", "-.")),
-        Entry("max-pressure", "baselines:MaxPressure", (
-            Variant("", Look("max-pressure", "brown", "<", ":"), rival=True),
-            Variant("facing=true", Look("two-phase max-pressure", "brown", "h", "--")),
+        Entry("adaptive", "baselines:Adaptive", SIGNALS,
+              _plain("adaptive signal", "orange", "^", "-")),
+        Entry("v2ic", "baselines:V2IC", RADIO,
+              _plain("V2I-C", "green", "D", "-."), as_run="v2ic-as-run"),
+        Entry("all-way-stop", "baselines:AllWayStop", BARE,
+              _plain("all-way stop", "ink", "X", "--")),
+        Entry("reservation", "baselines:Reservation", RADIO,
+              _plain("reservation", "purple", "<", "-")),
+        Entry("max-pressure", "baselines:MaxPressure", SIGNALS, (
+            Variant("", Look("max-pressure", "brown", "v", "-"), rival=True),
+            Variant("facing=true", Look("two-phase max-pressure", "brown", "h", "--"), rival=True),
         )),
-        Entry("slots", "baselines:Slots", (
-            Variant("", Look("slots for batches", "orange", "d", "-")),
-            Variant("batch=1", Look("slots, first come first served", "orange", "x", ":")),
+        Entry("slots", "baselines:Slots", RADIO, (
+            Variant("", Look("slots for batches", "ink", "P", "-"), rival=True),
+            Variant("batch=1", Look("slots, first come first served", "ink", "x", ":"), rival=True),
         )),
-        Entry("platoons", "baselines:Platoons", (
-            Variant("", Look("platoons, exhaustive", "ink", "1", "-")),
-            Variant("service=gated", Look("platoons, gated", "ink", "2", "-.")),
+        Entry("platoons", "baselines:Platoons", RADIO, (
+            Variant("", Look("platoons, exhaustive", "indigo", "*", "-"), rival=True),
+            Variant("service=gated",
+                    Look("platoons, gated", "indigo", (4, 1, 0), ":"), rival=True),
         )),
-        Entry("actuated", "baselines:Actuated"),
-        Entry("dim-as-run", "dim:AsRunDim"),
-        Entry("v2ic-as-run", "baselines:V2ICAsRun"),
-        Entry("unregulated", "minisim.control:Unregulated"),
+        Entry("actuated", "baselines:Actuated", SIGNALS,
+              _plain("actuated signal", "brown", "$a$", ":", rival=False)),
+        Entry("dim-as-run", "dim:AsRunDim", BARE,
+              _plain("DIM as run", "blue", "$d$", "--", rival=False)),
+        Entry("v2ic-as-run", "baselines:V2ICAsRun", RADIO,
+              _plain("V2I-C as run", "ink", "$v$", "-.", rival=False)),
+        Entry("unregulated", "minisim.control:Unregulated", BARE,
+              _plain("unregulated", "brown", "$u$", "-.", rival=False)),
     )
 })  # fmt: skip
 
@@ -114,6 +134,14 @@ VARIANTS: Mapping[str, Variant] = MappingProxyType({
 
 #: Spellings of the variants compared on equal terms, in the order used in figures.
 RIVALS = tuple(name for name, variant in VARIANTS.items() if variant.rival)
+
+#: The same by what they need.
+FAMILIES: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {
+        needs: tuple(name for name in RIVALS if CONTROLLERS[name.partition(":")[0]].needs == needs)
+        for needs in (BARE, SIGNALS, RADIO)
+    }
+)
 
 
 @cache
@@ -154,8 +182,7 @@ def controller_named(
 
 def label_of(series: str) -> str:
     """What figures and reports call a variant; the name itself if it has no look."""
-    variant = VARIANTS.get(series)
-    return variant.look.label if variant and variant.look else series
+    return VARIANTS[series].look.label if series in VARIANTS else series
 
 
 def read_spec(spec: str | Mapping[str, Any]) -> Call:

@@ -15,7 +15,7 @@ from minisim.files import markdown_table, write_table, write_text
 from minisim.parameters import Reals, declared, real, reals, whole
 from minisim.results.metrics import heading
 from minisim.version import __version__
-from scenarios.controllers import controller_named
+from scenarios.controllers import controller_named, label_of
 from scenarios.library import four_way
 from scenarios.recipe import Recipe
 from scenarios.statistics import Interval, mean_interval
@@ -27,12 +27,6 @@ if TYPE_CHECKING:
 
     from minisim.results.run import Run
 
-#: Controllers of the tour -> their names in its table and figure.
-CONTROLLERS = {
-    "dim": "DIM, paper's gate",
-    "dim:gate=harmonious": "DIM, harmonious gate",
-    "fixed-time": "fixed-time signal",
-}
 #: Columns of a sweep that are averaged over seeds.
 METRICS = ("waiting_time_s", "travel_time_s", "depart_delay_s", "unfinished")
 
@@ -53,7 +47,7 @@ class Tour:
     horizon: float = real("of each run", "s", above=0, default=3600.0)
     film_start: float = real("of the animation, at the highest density", "s", low=0, default=600.0)
     film_seconds: float = real("length of the animation", "s", above=0, default=60.0)
-    controllers: tuple[str, ...] = tuple(CONTROLLERS)
+    controllers: tuple[str, ...] = ("dim", "dim:gate=harmonious", "fixed-time")
 
     def __post_init__(self) -> None:
         if not self.densities:
@@ -150,7 +144,7 @@ def write_tables(points: pd.DataFrame, tour: Tour, folder: Path) -> None:
 def _cells(points: pd.DataFrame) -> list[list[str]]:
     cells = []
     for point in points.to_dict("records"):
-        name = CONTROLLERS.get(point["controller"], point["controller"])
+        name = label_of(point["controller"])
         means = (Interval(point[m], point[f"{m}_ci95"], point["seeds"]) for m in METRICS)
         cells.append([f"{point['density']:g}", name, *map(str, means), str(point["collisions"])])
     return cells

@@ -21,8 +21,9 @@ from types import FunctionType, ModuleType
 from typing import Any
 
 from minisim.errors import InputError, nearest, told
+from minisim.results.asked import Asked, asked_metrics, listed, metric_of
 from minisim.results.metric import Metric
-from minisim.results.metrics import METRICS, Asked, asked_metrics, listed, metric_of
+from minisim.results.metrics import METRICS
 
 #: File -> its text at the last import.
 _texts: dict[Path, bytes] = {}

@@ -89,10 +89,6 @@ class Optimum:
         """The numbers, for JSON."""
         return {"vehicles": self.vehicles, "bound_s": self.bound, "planned_s": self.planned}
 
-    def above(self, delay: float) -> float | None:
-        """By how much a mean delay [s] exceeds the bound [%]; None if the bound is 0."""
-        return 100.0 * (delay - self.bound) / self.bound if self.bound > 0.0 else None
-
     @cached_property
     def _kind(self) -> Ints:
         """The movement of each vehicle, those of each type in turn, shape (k,)."""
@@ -154,8 +150,12 @@ def compared(
             why = "a vehicle did not arrive" if delay is None else ""
         except CollisionError as error:
             delay, why = None, str(error)
-        above = None if delay is None else least.above(delay)
-        yield row | {"delay_s": delay, "above_percent": above, "error": why}
+        yield row | {"delay_s": delay, "above_percent": above(delay, least.bound), "error": why}
+
+
+def above(delay: float | None, least: float | None) -> float | None:
+    """By how much a delay exceeds the least one [%]; None if one is not known or the least is 0."""
+    return 100.0 * (delay - least) / least if least and delay is not None else None
 
 
 def mean_delay(run: Run) -> float | None:
@@ -182,24 +182,23 @@ def _least_delay(run: Run) -> float | None:
 
 
 def _above(run: Run) -> float | None:
-    delay, least = mean_delay(run), _least_delay(run)
-    return 100.0 * (delay - least) / least if least and delay is not None else None
+    return above(mean_delay(run), _least_delay(run))
 
 
 DELAY = Metric(
     "delay_s", delays, "s", "trip", "run and trips", title="delay",
     meaning="against driving on at the limits of the roads, whatever zones a controller has",
-    equation="arrival − demand − way/limits (ours; docs/optimum.md)",
+    equation="arrival − demand − way/limits (ours; docs/howto/optimum.md)",
 )  # fmt: skip
 LEAST = Metric(
     "least_delay_s", _least_delay, "s", title="least delay",
     meaning="no controller has a mean delay below it; none if it is not known",
-    equation="best order by dynamic programming (ours; docs/optimum.md)",
+    equation="best order by dynamic programming (ours; docs/howto/optimum.md)",
 )  # fmt: skip
 ABOVE = Metric(
     "above_least_percent", _above, "%", title="above the least delay",
     meaning="mean delay against the least possible; none if a vehicle has not arrived",
-    equation="100·(delay − least)/least (ours; docs/optimum.md)",
+    equation="100·(delay − least)/least (ours; docs/howto/optimum.md)",
 )  # fmt: skip
 
 

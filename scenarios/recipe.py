@@ -17,8 +17,8 @@ from minisim.hosting import REACTIONS
 from minisim.link import Linked
 from minisim.names import name_of
 from minisim.parameters import Spelled, Takes, checked, declared, part, real, text, whole, word
+from minisim.results.asked import Asked, asked_metrics
 from minisim.results.metric import Metric
-from minisim.results.metrics import Asked, asked_metrics
 from minisim.results.run import Run
 from scenarios.controllers import controller_named
 from scenarios.loading import metrics_named

@@ -13,6 +13,7 @@ import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from random import Random
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -25,6 +26,7 @@ from dim import Dim, NoisyPerception
 from dim.perception import See
 from minisim.arrivals import Arrivals
 from minisim.control import (
+    Accelerate,
     Close,
     Command,
     Controller,
@@ -45,8 +47,9 @@ from minisim.errors import FileError
 from minisim.junction.movements import ARM_NAMES
 from minisim.laws import Law
 from minisim.results.run import Run
+from minisim.results.trajectories import TRAJECTORY_COLUMNS
 from minisim.simulation import Simulation
-from minisim.testing import SmallScenario
+from minisim.testing import SmallScenario, small_scenario
 from minisim.vehicle import VehicleType
 from scenarios import Scenario
 from scenarios.library import four_way
@@ -180,6 +183,35 @@ class EveryStep:
         return ScriptedSession(plan, session.decide)
 
 
+#: What `Pedals` asks for [m/s²]; infinity leaves a vehicle to its law.
+PEDALS = (math.inf, math.inf, -1000.0, -9.0, -3.0, -1.0, 0.0, 0.5, 2.0, 1000.0)
+
+
+@dataclass(frozen=True)
+class Pedals:
+    """A controller that also sets random accelerations, of all vehicles up to the exit."""
+
+    controller: Controller
+    seed: int = 0
+    often: float = 0.2
+    press: Callable[[int, float], Command] = Accelerate
+    name: str = "pedals"
+
+    def start(self, site: Site) -> Session:
+        session, chance = self.controller.start(site), Random(self.seed)
+        plan = session.plan
+
+        def decide(view: View) -> Iterable[Command]:
+            near = tuple(it for it in view.vehicles if it.distance <= plan.sight)
+            yield from session.decide(view._replace(vehicles=near))
+            for vehicle in view.vehicles:
+                if chance.random() < self.often:
+                    yield self.press(vehicle.id, chance.choice(PEDALS))
+
+        sight = site.intersection.approach_length
+        return ScriptedSession(dataclasses.replace(plan, period=0.5, sight=sight), decide)
+
+
 @dataclass(frozen=True)
 class Deadly:
     """A controller that kills its process, as a bug in compiled code or a lack of memory would.
@@ -307,9 +339,12 @@ def drive(
 CURVES = {
     "dim": (0.6, 380.0), "dim:gate=harmonious": (0.4, 520.0),
     "dim:priorities=rotating": (0.6, 380.0), "dim:priorities=waiting": (0.6, 380.0),
-    "fixed-time": (8.0, 400.0), "adaptive": (5.0, 450.0), "v2ic": (0.1, 480.0),
-    "all-way-stop": (1.5, 550.0), "schedule": (0.1, 700.0),
+    "dim:gate=passed": (0.4, 540.0), "fixed-time": (8.0, 400.0), "adaptive": (5.0, 450.0),
+    "v2ic": (0.1, 480.0), "all-way-stop": (1.5, 550.0), "schedule": (0.1, 700.0),
     "reservation": (0.3, 600.0), "max-pressure": (4.0, 460.0),
+    "fixed-time:facing=true": (2.0, 380.0), "max-pressure:facing=true": (2.0, 440.0),
+    "slots": (0.2, 580.0), "slots:batch=1": (0.3, 560.0),
+    "platoons": (0.2, 620.0), "platoons:service=gated": (0.2, 600.0),
 }  # fmt: skip
 
 
@@ -520,3 +555,27 @@ def read_count(
     path = folder / "sheet.csv"
     path.write_bytes(text.encode(encoding))
     return read_counts(path, mapping)
+
+
+def at(
+    vehicle: int, movement: str, s: float, v: float, *, time: float = 0.0, row: bool = True,
+    a: float = 0.0,
+) -> dict[str, Any]:  # fmt: skip
+    """One row of a trajectory frame of a `small_scenario`; `s` from the junction entry."""
+    entry = small_scenario(4).intersection.approach_length
+    zero = dict.fromkeys(TRAJECTORY_COLUMNS, 0.0)
+    return zero | {
+        "time_s": time, "vehicle": vehicle, "lane": movement[0], "manoeuvre": int(movement[1]),
+        "s_m": entry + s, "speed_mps": v, "acceleration_mps2": a, "right_of_way": row,
+    }  # fmt: skip
+
+
+def frame_of(*rows: dict[str, Any]) -> pd.DataFrame:
+    """A trajectory frame."""
+    return pd.DataFrame(list(rows), columns=list(TRAJECTORY_COLUMNS))
+
+
+def glide(vehicle: int, movement: str, start: float, v: float) -> list[dict[str, Any]]:
+    """A vehicle at constant speed whose front passes the entry at `start`; a row per 0.1 s."""
+    times = np.arange(round(start * 10) - 60, round(start * 10) + 60) / 10.0
+    return [at(vehicle, movement, v * (t - start), v, time=t) for t in times.tolist()]

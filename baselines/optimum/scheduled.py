@@ -3,7 +3,7 @@
 It knows the order of all vehicles of a run beforehand, so it is no rival. It shows how near to the
 bound vehicles can be driven (`baselines.ordered`).
 
-From the protocol of `baselines.reservation` it differs in two ways. Passages fit if the bodies keep
+From `baselines.passages` it differs in two ways. Passages fit if the bodies keep
 a clearance (`minisim.junction.coordination`) at any two moments up to `buffer` apart. And vehicles
 enter a shared exit lane in the order of the schedule.
 """
@@ -16,10 +16,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from baselines.manager import Manager, Slot
 from baselines.optimum.alone import drives
 from baselines.optimum.planning import drivable
 from baselines.ordered import Due, OrderedSession, Times
-from baselines.reservation import Manager, Slot
+from baselines.passages import Passages
 from minisim.control import Command, Cover, Observed, Site, View
 from minisim.errors import InputError, integer, items, number, show
 from minisim.junction.coordination import STEP, Region, region
@@ -120,14 +121,12 @@ class Bodies(Manager):
 class ScheduledSession(OrderedSession):
     """One run, in the order of the schedule."""
 
-    manager: Bodies
-
     def __init__(self, controller: Scheduled, site: Site) -> None:
         needs, ways = drivable(site, controller.buffer), drives(site)
         past = (needs.until - [way.before for way in ways]).tolist()
         times = Times(needs.rules.between, past, ways)
-        bodies, reach = Bodies(site, controller.buffer), site.intersection.approach_length
-        super().__init__(bodies, controller.period, reach, site, times)
+        self._bodies, reach = Bodies(site, controller.buffer), site.intersection.approach_length
+        super().__init__(Passages(self._bodies, site), controller.period, reach, site, times)
         self._turns = controller.turns
         self._place = {(it.lane, it.rank): k for k, it in enumerate(controller.turns)}
         self._first = 0  # place of the first in the schedule that has not passed
@@ -138,11 +137,11 @@ class ScheduledSession(OrderedSession):
         """Note which vehicles have come, and decide in the order of the schedule."""
         self._seen = {(it.lane, it.rank): it for it in view.vehicles}
         for it in view.vehicles:
-            self.manager.place[it.id] = self._place[it.lane, it.rank]
+            self._bodies.place[it.id] = self._place[it.lane, it.rank]
             self._newest[it.lane] = max(self._newest.get(it.lane, -1), it.rank)
         return super().decide(view)
 
-    def _order(self, now: int) -> Iterator[Due]:  # noqa: ARG002
+    def _order(self) -> Iterator[Due]:
         """Those that have not passed, up to the last one in view."""
         left = len(self._seen)
         while self._first < len(self._turns) and self._passed(self._turns[self._first]):

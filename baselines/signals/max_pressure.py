@@ -40,7 +40,7 @@ class MaxPressure:
         "green between two looks, counted from when the green is shown", "s",
         low=0.5, high=3600, default=10.0,
     )  # fmt: skip
-    # Any will do: the first vehicle of a queue stands within 1.01 m. DIM sees 8 m.
+    # Any will do: the first vehicle of a queue stands within `SUMO_AT_LINE`. DIM sees 8 m.
     detector_range: float = real(
         "length of approach on which a queue is counted; by default as for `Adaptive`", "m",
         low=2, high=1000, default=100.0,

@@ -34,6 +34,7 @@ from minisim.control import (
     HALTING,
     LATERAL_ACCELERATION,
     ORDINARY,
+    SUMO_AT_LINE,
     Command,
     Go,
     Hold,
@@ -46,9 +47,6 @@ from minisim.junction.conflicts import conflict_zones
 
 #: Critical gap and follow-up headway of a permitted left turn [s] (HCM 2010, chapter 31).
 CRITICAL_GAP, FOLLOW_UP = 4.5, 2.5
-#: A vehicle waits at the line when its front is at most this far before it [m]; SUMO's own stand
-#: 1.001 m off.
-LINE = 1.01
 #: Time between two looks for a gap [s].
 LOOK = 0.2
 #: Ways whose angles differ by less than this turn alike [rad].
@@ -138,7 +136,7 @@ class PermittedHeads(Heads):
         back = gone[len(committed(gone, self._stops)) :]
         self._let_go.difference_update(v.id for v in back)
         first = next((v for v in approaching if v.id not in self._let_go), None)
-        if first is not None and first.distance <= LINE and self._waits[self._way(first)]:
+        if first is not None and first.distance <= SUMO_AT_LINE and self._waits[self._way(first)]:
             self._sneakers[lane] = first.id
         return [Hold(v.id) for v in back]
 
@@ -198,7 +196,7 @@ class PermittedHeads(Heads):
                 gone = v.id in self._let_go
                 if gone or comes:
                     yield v
-                if not gone and v.distance <= LINE and self._waits[self._way(v)]:
+                if not gone and v.distance <= SUMO_AT_LINE and self._waits[self._way(v)]:
                     comes = False
 
     def _keep_clear(self, lane: int, lanes: Lanes) -> Iterator[Command]:

@@ -18,7 +18,8 @@ in its way, the one that came later waits until the first has entered, and then 
 the way. What has not come yet comes later: a human must stand at the line first, and a vehicle of
 DIM must be the first of its lane in the yellow zone.
 
-No vehicles wait in a circle, and no vehicle overtakes a human in whose way it is: `docs/safety.md`.
+No vehicles wait in a circle, and no vehicle overtakes a human in whose way it is:
+`docs/background/safety.md`.
 """
 
 from __future__ import annotations

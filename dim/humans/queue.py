@@ -8,9 +8,7 @@ from dim.harmony import HarmonyMatrix
 from dim.humans.drivers import Drivers, Readings
 from dim.perception import ROUNDING, UNKNOWN
 from dim.zones import Zones
-from minisim.control import HALTING, Observed, View
-
-LINE = 1.0  #: a driver stands at the line when its front is at most this far before it [m]
+from minisim.control import AT_LINE, HALTING, Observed, View
 
 
 class Queue:
@@ -23,7 +21,7 @@ class Queue:
 
     def __init__(self, zones: Zones, drivers: Drivers) -> None:
         self._yellow = zones.yellow_start + ROUNDING
-        self._line = zones.green + LINE
+        self._line = zones.green + AT_LINE
         self._drivers = drivers
         self.heads: dict[int, Observed] = {}  #: by id, in order
         self.people: set[int] = set()  #: ids of the humans among them

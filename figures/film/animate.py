@@ -7,7 +7,7 @@ milliseconds; drawing a full figure takes fifty.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Container, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping
 from typing import Any
 
 import matplotlib as mpl
@@ -16,14 +16,12 @@ from matplotlib.animation import FuncAnimation
 from matplotlib.artist import Artist
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection, PolyCollection
-from matplotlib.lines import Line2D
-from matplotlib.patches import Polygon
-from matplotlib.text import Text
 from PIL import Image
 
 from figures import style
-from figures.film import encode
+from figures.film import encode, legend
 from figures.film.frames import Frames
+from figures.film.legend import BAND, DPI, FOOT, HEIGHT, WIDTH
 from figures.junction import drawing
 from figures.whole import filmed
 from minisim.errors import number
@@ -32,16 +30,8 @@ from minisim.junction.paths import Floats
 from minisim.names import name_of
 from minisim.results.run import Run
 
-#: Picture size in inches, and its resolution: 720 × 900 pixels. Video needs even numbers.
-WIDTH, HEIGHT, DPI = 7.2, 9.0, 100
 #: Most megabytes of an animation in a notebook.
 EMBEDDED = 200.0
-#: Inches of legend below the junction.
-FOOT = 1.02
-#: How opaque the band is that shows a vehicle's way.
-BAND = 0.28
-#: An entry of the legend: colour, words, shape.
-Key = tuple[str, str, str]
 
 
 def write_animation(
@@ -122,9 +112,10 @@ class Picture:
         self._axes = self._figure.add_axes((0.0, FOOT / HEIGHT, 1.0, WIDTH / HEIGHT))
         drawing.draw_junction(self._axes, intersection, plan, reach)
         self._moving = self._add_moving()
-        self._write_still()
-        self._clock = self._text(0.97, HEIGHT - 0.3, 18, "right", bold=True)
-        self._counts = self._text(0.97, HEIGHT - 0.62, 12, "right")
+        legend.write_title(self._figure, run, self.title)
+        legend.write_legend(self._figure, run, self._film)
+        self._clock = legend.write(self._figure, 0.97, HEIGHT - 0.3, "", 18, bold=True, ha="right")
+        self._counts = legend.write(self._figure, 0.97, HEIGHT - 0.62, "", 12, ha="right")
         for artist in (*self._moving, self._clock, self._counts):
             artist.set_animated(True)
         agg: Any = FigureCanvasAgg  # its methods have no types
@@ -188,74 +179,6 @@ class Picture:
             axes.add_collection(artist)
         return (self._ways, self._holds, *added, *self._heads.values())
 
-    def _write_still(self) -> None:
-        scenario = self.run.scenario
-        demand = f"{scenario.density:.0f} veh/h/lane"
-        if getattr(scenario, "recorded", None) is not None:
-            demand = f"{len(self.run.columns.lane)} recorded arrivals"
-        title = self._text(0.03, HEIGHT - 0.3, 16, "left", bold=True)
-        title.set_text(self.title)
-        title.set_fontsize(16 * min(1.0, 0.8 * WIDTH * DPI / title.get_window_extent().width))
-        self._text(0.03, HEIGHT - 0.62, 12, "left", colour=style.MUTED).set_text(
-            f"{demand} · profile {scenario.profile_name} · seed {self.run.seed}"
-        )
-        lines: list[Key] = [(style.RIGHT_OF_WAY, "band: its way", "band")]
-        if self._film.signalled:
-            lines += [(head.colour, state, head.marker) for state, head in style.HEADS.items()]
-        else:
-            lines += [(style.RIGHT_OF_WAY, "hold line: the first may go", "line"),
-                      (style.INK, "holds", "line")]  # fmt: skip
-        rows = [self._vehicle_keys(), lines, [
-            (style.ZONES.get(name, style.SKY), words + drawing.MEANINGS.get(name, ""), "area")
-            for name, words in drawing.zone_words(self.run.plan).items()
-        ]]  # fmt: skip
-        rows = [row for row in rows if row]
-        for k, row in enumerate(rows):
-            self._key(FOOT / 2.0 + 0.3 * ((len(rows) - 1) / 2.0 - k), row)
-
-    def _vehicle_keys(self) -> list[Key]:
-        keys: list[Key] = [
-            (style.RIGHT_OF_WAY, "has the right of way", "body"),
-            (style.WAITING, "stands", "body"), (style.FREE, "moves", "body"),
-        ]  # fmt: skip
-        if self._film.human.any():
-            keys.append((style.INK, "outline: human", "body"))
-        if self.run.collisions:
-            keys.append((style.BLACK, "collided", "body"))
-        return keys
-
-    def _key(self, y: float, entries: Sequence[Key]) -> None:
-        """One line of the legend, `y` inches from the bottom: swatches and what they mean."""
-        x, gap = 0.03, 0.04 if len(entries) < 5 else 0.015
-        for colour, name, shape in entries:
-            self._swatch(x, y, colour, shape)
-            label = self._text(x + 0.048, y, 12, "left")
-            label.set_text(name)
-            x += 0.048 + label.get_window_extent().width / (WIDTH * DPI) + gap
-
-    def _swatch(self, x: float, y: float, colour: str, shape: str) -> None:
-        """A body, area, band or line, or the marker of a signal head."""
-        on: dict[str, Any] = {"transform": self._figure.transFigure}
-        if shape not in ("body", "area", "band", "line"):
-            self._figure.add_artist(Line2D(
-                [x + 0.02], [y / HEIGHT], color=colour, marker=shape, markersize=9.0,
-                linestyle="none", markeredgecolor=style.INK, markeredgewidth=0.7, **on,
-            ))  # fmt: skip
-            return
-        half = 0.022 if shape == "line" else 0.085
-        shoulder = 0.026 if shape == "body" else 0.038
-        corners = [(0, -half), (shoulder, -half), (0.038, 0), (shoulder, half), (0, half)]
-        self._figure.add_artist(Polygon(
-            [(x + dx, (y + dy) / HEIGHT) for dx, dy in corners], facecolor=colour, linewidth=0,
-            alpha=BAND if shape == "band" else 1.0, **on,
-        ))  # fmt: skip
-
-    def _text(
-        self, x: float, y: float, size: float, align: str, *, colour: str = style.INK, **font: Any
-    ) -> Text:
-        """An empty text, `y` inches from the bottom."""
-        return style.write(self._figure, x, y / HEIGHT, "", size, colour=colour, ha=align, **font)
-
     def _move(self, time: float) -> None:
         film, run = self._film, self.run
         now = film.at(time)
@@ -300,7 +223,7 @@ class Picture:
         film = self._film
         clock = f"{int(time) // 60:02d}:{int(time) % 60:02d}"
         seen = film.rows(film.at(time), self._reach)
-        counts = f"standing {film.waiting(seen)}   served {film.served(time)}"
+        counts = f"in queues {film.waiting(seen)}   served {film.served(time)}"
         if self.run.collisions:
             counts = f"collisions {film.collided(time)}   {counts}"
         before = self._clock.get_text() + self._counts.get_text()

@@ -4,23 +4,28 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from figures.junction import drawing
 from figures.whole import HeadSpan, head_spans
-from minisim.control import HALTING
 from minisim.errors import InputError
+from minisim.junction.movements import Bools
 from minisim.junction.paths import Floats
 from minisim.junction.turns import indicator
+from minisim.results.queues import queueing
 from minisim.results.run import Run
 from minisim.results.trajectories import movement_index
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Rows = npt.NDArray[np.int64]
 
 #: States of a vehicle.
-DRIVING, STANDING, RELEASED = 0, 1, 2
+DRIVING, QUEUEING, RELEASED = 0, 1, 2
 #: A collision is marked for this long [s] by a ring of this radius [m].
 COLLISION_SHOWN, RING = 3.0, 5.0
 #: The middle of the roof is this share of a body's length behind its front, and the arrow on it
@@ -53,8 +58,8 @@ class Frames:
         self.type = run.columns.type[frame["vehicle"].to_numpy()]
         clear = self.exit[self.path] + np.array([it.length for it in site.types])[self.type]
         released = frame["right_of_way"].to_numpy() & (self.s <= clear)
-        self.still = frame["speed_mps"].to_numpy() <= HALTING
-        self.state = np.where(released, RELEASED, np.where(self.still, STANDING, DRIVING))
+        self.queueing = _queueing(frame)
+        self.state = np.where(released, RELEASED, np.where(self.queueing, QUEUEING, DRIVING))
         self._bearing = np.array([site.intersection.arms[p.exit_arm].bearing for p in paths])
         self._heads: dict[int, list[HeadSpan]] = {}
         for span in head_spans(run):
@@ -88,8 +93,8 @@ class Frames:
         return np.asarray(rows[inside])
 
     def waiting(self, rows: Rows) -> int:
-        """How many of these vehicles are standing."""
-        return int(self.still[rows].sum())
+        """How many of these vehicles are in a queue."""
+        return int(self.queueing[rows].sum())
 
     def served(self, time: float) -> int:
         """How many vehicles have cleared the junction since the film began, without a collision."""
@@ -182,3 +187,12 @@ class Frames:
             ]
             rings.append(ring + np.mean(centres, axis=0))
         return rings
+
+
+def _queueing(frame: pd.DataFrame) -> Bools:
+    """Which rows of trajectories, which are sorted by time, are of a vehicle in a queue."""
+    vehicle, speed = frame["vehicle"].to_numpy(), frame["speed_mps"].to_numpy()
+    order = np.argsort(vehicle, kind="stable")
+    out = np.empty(len(frame), dtype=bool)
+    out[order] = queueing(speed[order], np.diff(vehicle[order], prepend=-1) != 0)
+    return out

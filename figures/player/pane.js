@@ -22,7 +22,7 @@ class Pane {
     const name = player.make("b", "", caption);
     name.textContent = name.title = data.controller;
     this.counts = player.make("span", "counts", caption);
-    this.counts.title = "standing: vehicles in the picture that stand; served: those that have left the junction since the start of the scene, without a collision";
+    this.counts.title = "in queues: vehicles in the picture that stand, or have moved up no faster than 10 km/h since; served: those that have left the junction since the start of the scene, without a collision";
     player.make("span", "what", caption).textContent = `${data.title} · ${data.demand} · profile ${data.profile} · seed ${data.seed}`;
     this.canvas = player.make("canvas", "junction", this.figure);
     this.canvas.setAttribute("role", "img");
@@ -80,7 +80,7 @@ class Pane {
     this.drawCrashes(pen, step, k, at);
     this.drawNames(pen, k, at);
     const seen = near.filter((it) => Math.max(Math.abs(it.x), Math.abs(it.y)) <= reach);
-    const counts = [`standing ${seen.filter((it) => it.stands).length}`, `served ${lastAt(scene.cleared, step, (it) => it) + 1}`];
+    const counts = [`in queues ${seen.filter((it) => it.stands).length}`, `served ${lastAt(scene.cleared, step, (it) => it) + 1}`];
     if (scene.data.collisions.length) counts.unshift(`collisions ${scene.data.collisions.filter(([s]) => s <= step).length}`);
     player.write(this.counts, counts.join(" · "));
     this.tell();

@@ -1,4 +1,4 @@
-// The player of scenes, as one custom element; docs/scene.md tells what a scene holds.
+// The player of scenes, as one custom element; docs/reference/scene.md tells what a scene holds.
 //
 //   element.show([scene, …])   one or two scenes on one clock, side by side
 //   element.time               the time that is shown [s]; may be set
@@ -149,7 +149,7 @@ class Player extends HTMLElement {
     const scenes = this.panes.map((it) => it.scene), some = (test) => scenes.some(test), rows = [];
     const row = (kind, colour, text, extra = "") => rows.push([kind, colour, text, extra]);
     row("body", "goes", "has the right of way; band: its way");
-    row("body", "stands", "stands");
+    row("body", "stands", "in a queue");
     row("body", "moves", "moves");
     row("arrow", "ink", "to its exit; lamps blink if it turns");
     if (some((it) => it.tracks.some((track) => track.human))) row("body outline", "moves", "dark outline: human driver");

@@ -1,6 +1,6 @@
 """A run as a scene: everything that a player shows of it, as plain data for JSON.
 
-docs/scene.md tells the format. Times are whole steps of the scene after its start.
+docs/reference/scene.md tells the format. Times are whole steps of the scene after its start.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ import numpy.typing as npt
 from figures.player import vlq
 from figures.player.ground import ground, headings, picture_reach, ways
 from figures.whole import filmed, heads
-from minisim.control import HALTING
 from minisim.errors import FileError, number, show
 from minisim.files import AnyPath, read_file, write_text
 from minisim.names import name_of
 from minisim.reasons import Reason
+from minisim.results.queues import queueing
 from minisim.results.run import Run
 from minisim.ticks import first_tick
 
@@ -159,8 +159,8 @@ def _tracks(run: Run, clock: _Clock) -> tuple[list[dict[str, Any]], set[tuple[in
     clear = np.array([it.exit for it in site.intersection.paths])[path]
     clear += np.array([it.length for it in site.types])[kind]
     goes &= s <= clear
-    state = 2 * goes + (v <= HALTING)  # see docs/scene.md
     new = (np.diff(vehicle, prepend=-1) != 0) | (np.diff(step, prepend=-1) != 1)
+    state = 2 * goes + queueing(v, new)  # see docs/reference/scene.md
     starts = np.flatnonzero(new)
     centimetres = np.round(100.0 * s).astype(np.int64)
     texts = vlq.encoded(vlq.second_differences(centimetres, starts), starts)

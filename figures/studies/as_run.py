@@ -74,7 +74,7 @@ def ending(archive: Archive) -> str:
     ran = "The study `as-run` was not run for this report. " if rows.empty else ""
     collisions = [
         f"\nWhy {style.look(name).label} collides as it was run: {COLLIDING[name]} "
-        "(docs/fidelity.md, discrepancies)."
+        "(docs/background/fidelity.md, discrepancies)."
         for name in COLLIDING
         if not rows.empty and (rows["collisions"][rows["series"] == name] > 0).any()
     ]

@@ -17,14 +17,6 @@ from scenarios.studies.capacity import STUDY, Capacity, capacities
 from scenarios.studies.shared.archive import MissingRunsError
 from scenarios.studies.shared.study import Results
 
-#: Arms -> look.
-LOOKS = {
-    3: style.Look("3 arms", style.GREEN, "^", "-"),
-    4: style.Look("4 arms", style.BLUE, "s", "-"),
-    5: style.Look("5 arms", style.VERMILLION, "p", "-"),
-    6: style.Look("6 arms", style.INK, "h", "-"),
-}
-
 
 def needed_capacities(results: Results) -> list[Capacity]:
     """Every known capacity; raises `MissingRunsError` if there is none."""
@@ -40,8 +32,9 @@ def needed_capacities(results: Results) -> list[Capacity]:
 def capacity_figure(results: Results) -> Figure:
     """Capacities with their intervals."""
     known = needed_capacities(results)
-    figure = style.new_figure(9.2, 5.2)
-    axes = figure.add_axes((0.2, 0.15, 0.78, 0.67))
+    high = 1.7 + 0.39 * len(RIVALS)
+    figure = style.new_figure(9.2, high)
+    axes = figure.add_axes((0.24, 0.8 / high, 0.74, 1.0 - 1.7 / high))
     ends = [end for c in known for bracket in c.brackets for end in bracket if end < math.inf]
     highest = 100.0 * math.ceil(1.04 * max(ends) / 100.0)
     for capacity in known:
@@ -58,7 +51,7 @@ def capacity_figure(results: Results) -> Figure:
     if missing := len(STUDY.points) - len(known):
         note += f"  Not drawn, for lack of runs: {missing} of {len(STUDY.points)} cases."
     title = "Capacity: the largest demand served without a growing queue"
-    plots.frame(figure, title, LOOKS.values(), note, lines=False)
+    plots.frame(figure, title, map(style.coloured, style.ARMS.values()), note, lines=False)
     return figure
 
 
@@ -92,7 +85,7 @@ def _extent(results: Results) -> str:
 
 def _draw_capacity(axes: Axes, capacity: Capacity, highest: float) -> None:
     """Mean and interval, or a pale line if only a bound is known."""
-    look = LOOKS[capacity.arms]
+    look = style.coloured(style.ARMS[capacity.arms])
     place = RIVALS.index(capacity.series) + 0.17 * (capacity.arms - 4.5)
     low, high = capacity.above, capacity.below
     if low is None and high is None:

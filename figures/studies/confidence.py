@@ -17,8 +17,8 @@ def confidence_figure(results: Results) -> Figure:
     """Collisions, false grants and delay, plotted against the confidence threshold."""
     rows = with_total_delay(results.good)
     figure, panels = plots.panels(
-        11.5, 4.6, len(outcomes.OUTCOMES), sharey=False, left=0.062, right=0.988, top=0.79,
-        bottom=0.155, wspace=0.22,
+        11.5, 4.6, len(outcomes.OUTCOMES), sharey=False, left=0.07, right=0.988, top=0.79,
+        bottom=0.155, wspace=0.28,
     )  # fmt: skip
     for axes, outcome in zip(panels, outcomes.OUTCOMES, strict=True):
         for (kind, look), aside in zip(outcomes.KIND_LOOKS.items(), (-0.08, 0.08), strict=True):

@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from figures import plots, style
+from figures.studies.shared.families import Panel, panels_by_family
 from figures.studies.shared.section import Item, Section
 from figures.tables import Table
 from scenarios.controllers import RIVALS
@@ -21,21 +22,19 @@ from scenarios.studies.shared.study import Results, with_total_delay
 def fair_figure(results: Results) -> Figure:
     """Every controller with one vehicle and speed limit: three measures over demand."""
     rows = with_total_delay(results.good)
-    figure, panels = plots.panels(
-        11.5, 5.4, len(MEASURES), left=0.058, right=0.99, top=0.735, bottom=0.135, wspace=0.06
+    figure, grid = panels_by_family(
+        RIVALS, [Panel(name.capitalize(), rows, column) for name, column in MEASURES.items()]
     )
-    for axes, (measure, column) in zip(panels, MEASURES.items(), strict=True):
-        plots.draw_means(axes, rows, column, RIVALS)
-        style.plot_axes(axes, measure.capitalize(), plots.DENSITY_LABEL, "")
+    for axes in grid.flat:
         plots.log_time(axes, 0.0, 4000.0, linear=0.1)
         plots.density_axis(axes, rows["density"])
-    panels[0].set_ylabel(f"mean of all vehicles [s], {plots.scale_words(0.1)}", **style.LABEL)
+    for axes in grid[:, 0]:
+        axes.set_ylabel(f"mean of all vehicles [s],\n{plots.scale_words(0.1)}", **style.LABEL)
     note = (
         f"{missing_note(results)}  Waiting is standing on the road: it leaves out the queue "
         "before a full road, and V2I-C's vehicles crawl."
     )
-    title, looks = "Every controller on four arms, profile fair", map(style.look, RIVALS)
-    plots.frame(figure, title, looks, note, ncols=4, marks=0.842)
+    plots.frame(figure, "Every controller on four arms, profile fair", (), note, marks=0.95)
     return figure
 
 
@@ -43,11 +42,11 @@ def crossing_figure(results: Results) -> Figure:
     """The demands at which DIM does worse than each rival, with both gates."""
     known = needed_losses(results)
     figure, panels = plots.panels(
-        11.0, 4.7, len(MEASURES), left=0.14, right=0.985, top=0.745, bottom=0.155, wspace=0.06
+        11.0, 7.4, len(MEASURES), left=0.18, right=0.985, top=0.805, bottom=0.1, wspace=0.06
     )
     for axes, measure in zip(panels, MEASURES, strict=True):
         for place, rival in enumerate(OTHERS):
-            for gate, aside in zip(GATES, (-0.16, 0.16), strict=True):
+            for gate, aside in zip(GATES, (-0.26, 0.0, 0.26), strict=True):
                 if (measure, gate, rival) in known:
                     _draw_crossing(axes, known[measure, gate, rival], gate, place + aside)
         style.plot_axes(axes, measure.capitalize(), plots.DENSITY_LABEL, "")
@@ -59,9 +58,10 @@ def crossing_figure(results: Results) -> Figure:
     plots.frame(figure, title, looks, missing_note(results))
     words = (
         "pale bar: demands at which DIM does worse     marker and line: where that begins, with "
-        "its 95 % interval     hollow: at none or all of these demands, on average"
+        "its 95 % interval\nhollow marker: on average at all of these demands (on the left) or at "
+        "none (on the right)"
     )
-    style.write(figure, plots.LEFT, 0.845, words, 8.5)
+    style.write(figure, plots.LEFT, 0.872, words, 8.5)
     return figure
 
 
@@ -77,7 +77,7 @@ def loss_table(results: Results) -> Table:
             rows.append((style.look(rival).label, measure, *chain.from_iterable(texts)))
     return Table(
         "Demand from which DIM does worse [veh/h/lane]",
-        ("than", "measure", "paper's gate", "95 % interval", "harmonious gate", "95 % interval"),
+        ("than", "measure", *(t for g in GATES for t in (style.look(g).label, "95 % interval"))),
         tuple(rows), labels=2,
         notes=(
             f"{missing_note(results)}  "
@@ -95,18 +95,13 @@ def _draw_crossing(axes: Axes, crossing: Crossing, gate: str, y: float) -> None:
     ends = crossing.density, crossing.until, crossing.low, crossing.high
     start, end, least, most = np.clip(ends, *crossing.tried).tolist()
     if crossing.density < math.inf:
-        axes.barh(y, end - start, left=start, height=0.24, color=look.colour, alpha=0.35, zorder=2)
-    elif not math.isfinite(crossing.low):
-        axes.text(crossing.tried[1], y, "nowhere", ha="right", va="center", fontsize=8.5,
-                  color=look.colour)  # fmt: skip
-    bounded = math.isfinite(crossing.low) or math.isfinite(crossing.high)
-    if bounded:
+        axes.barh(y, end - start, left=start, height=0.2, color=look.colour, alpha=0.35, zorder=2)
+    if math.isfinite(crossing.low) or math.isfinite(crossing.high):
         axes.plot([least, most], [y, y], color=look.colour, marker="|", markersize=8.0,
                   markeredgewidth=1.6, linewidth=1.6, zorder=3)  # fmt: skip
     known = math.isfinite(crossing.density)
-    if known or bounded:
-        axes.plot([start], [y], marker=look.marker, color=look.colour, markersize=5.5, zorder=4,
-                  markerfacecolor=look.colour if known else style.PAPER)  # fmt: skip
+    axes.plot([start], [y], marker=look.marker, color=look.colour, markersize=5.5, zorder=4,
+              markerfacecolor=look.colour if known else style.PAPER)  # fmt: skip
 
 
 SECTION = Section(

@@ -21,7 +21,7 @@ def fairness_figure(results: Results) -> Figure:
     """Waiting in each lane and in the worst lane, and how unequal it is between lanes."""
     rows = lane_waits(results.good, 4)
     figure, (by_lane, worst, spread) = plots.panels(
-        11.0, 4.7, 3, sharey=False, left=0.055, right=0.985, top=0.745, bottom=0.15, wspace=0.22
+        11.0, 4.7, 3, sharey=False, left=0.06, right=0.985, top=0.745, bottom=0.15, wspace=0.26
     )
     compared = min(set(rows["density"]), key=lambda density: abs(density - LANE_DENSITY))
     _draw_lanes(by_lane, rows[rows["density"] == compared])

@@ -1,4 +1,4 @@
-"""The paper's gate against the harmonious one."""
+"""The paper's gate against the others."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from scenarios.studies.shared.study import Results
 
 
 def gate_figure(results: Results) -> Figure:
-    """Both gates on three, four and five arms."""
+    """All gates on three, four and five arms."""
     figure, panels = plots.panels(
         11.0, 4.7, 3, left=0.06, right=0.985, top=0.745, bottom=0.15, wspace=0.06
     )
@@ -23,12 +23,12 @@ def gate_figure(results: Results) -> Figure:
         plots.log_time(axes, 0.0, 500.0, linear=0.1)
         plots.density_axis(axes)
     panels[0].set_ylabel(f"mean waiting [s], {plots.scale_words(0.1)}", **style.LABEL)
-    title = "Two gates: a clear junction, or harmony with all vehicles that cross"
+    title = "DIM's gates: which vehicles may enter while others cross"
     plots.frame(figure, title, map(style.look, GATES), missing_note(results), marks=0.865)
     return figure
 
 
 SECTION = Section(
-    "How far does the harmonious gate move it?",
-    (Item("gate", "clear against harmonious gate", gate_figure, ("gate",)),),
+    "How far do other gates move it?",
+    (Item("gate", "the gates of DIM", gate_figure, ("gate",)),),
 )

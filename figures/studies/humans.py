@@ -6,17 +6,18 @@ from matplotlib.figure import Figure
 
 from figures import plots, style
 from figures.studies.shared.section import Item, Section
-from scenarios.studies.fair import GATES
-from scenarios.studies.humans import DENSITIES, SHARES, STOP, delays
+from scenarios.studies.humans import DENSITIES, GATES, SHARES, STOP, delays
 from scenarios.studies.shared.archive import missing_note
 from scenarios.studies.shared.study import TOTAL_DELAY, Results, with_total_delay
 
-#: (group of vehicles, gate) -> look: colour and marker show the group, the line shows the gate.
+#: (group of vehicles, gate) -> look; vehicles of DIM look as elsewhere.
 LOOKS = {
     ("human", GATES[0]): style.Look("human drivers, gate clear", style.VERMILLION, "s", "-"),
-    ("automated", GATES[0]): style.Look("vehicles of DIM, gate clear", style.BLUE, "o", "-"),
-    ("human", GATES[1]): style.Look("human drivers, gate harmonious", style.VERMILLION, "s", ":"),
-    ("automated", GATES[1]): style.Look("vehicles of DIM, gate harmonious", style.BLUE, "o", ":"),
+    ("automated", GATES[0]): style.look(GATES[0])._replace(label="vehicles of DIM, gate clear"),
+    ("human", GATES[1]): style.Look("human drivers, gate harmonious", style.ORANGE, "D", ":"),
+    ("automated", GATES[1]): style.look(GATES[1])._replace(
+        label="vehicles of DIM, gate harmonious"
+    ),
 }
 #: Sideways shift between the gates [%], so that error bars do not overlap.
 SHIFT = 1.2
@@ -44,7 +45,7 @@ def human_figure(results: Results) -> Figure:
                          linewidth=1.1)  # fmt: skip
         style.plot_axes(axes, f"{density:g} veh/h/lane", "human drivers [%]", "")
         axes.set_xticks([100.0 * share for share in SHARES[::2]])
-        plots.log_time(axes, 1.0, 1000.0)
+        plots.log_time(axes, 1.0, 2000.0)
     panels[0].set_ylabel("mean delay of all vehicles [s], logarithmic", **style.LABEL)
     note = (
         f"{missing_note(results)}  Delay is time loss and departure delay, up to the end of the "

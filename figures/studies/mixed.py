@@ -22,6 +22,8 @@ WORDS = {"car": "cars alone", "india": "vehicles registered in India"}
 DENSITY_LABEL = "demand [PCU/h/lane]"
 #: The controllers with which the paper compares DIM.
 COMPARED = ("fixed-time", "adaptive", "v2ic")
+#: Those that the figure names; it has the others pale behind them.
+SHOWN = (*GATES, *COMPARED)
 
 
 def mixed_figure(results: Results) -> Figure:
@@ -35,7 +37,7 @@ def mixed_figure(results: Results) -> Figure:
     for (row, fleet), (column, arms) in product(enumerate(FLEETS), enumerate(ARMS)):
         axes, good = grid[row, column], results.good
         rows = good[(good["arms"] == arms) & (good["fleet"] == fleet)]
-        plots.draw_means(axes, rows, WAITING, RIVALS)
+        plots.draw_means(axes, rows, WAITING, SHOWN, RIVALS)
         label = DENSITY_LABEL if fleet == FLEETS[-1] else ""
         style.plot_axes(axes, f"{arms} arms, {WORDS[fleet]}", label, "")
         plots.log_time(axes, 0.0, 500.0, linear=0.1)
@@ -43,7 +45,8 @@ def mixed_figure(results: Results) -> Figure:
     for axes in grid[:, 0]:
         axes.set_ylabel(f"mean waiting [s], {plots.scale_words(0.1)}", **style.LABEL)
     title = "The same demand in passenger car units, as cars and as Indian vehicles"
-    plots.frame(figure, title, map(style.look, RIVALS), missing_note(results), ncols=4, marks=0.87)
+    looks = [*map(style.look, SHOWN), plots.OTHERS]
+    plots.frame(figure, title, looks, missing_note(results), ncols=4, marks=0.87)
     return figure
 
 

@@ -6,9 +6,10 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from figures import plots, style
+from figures.studies.shared.families import Panel, panels_by_family
 from figures.studies.shared.section import Item, Section
 from figures.tables import Table
-from scenarios.controllers import RIVALS, label_of
+from scenarios.controllers import RIVALS
 from scenarios.optimum import ABOVE, LEAST
 from scenarios.statistics import mean_interval
 from scenarios.studies.optimum import DENSITIES, SCHEDULE
@@ -21,23 +22,19 @@ SERIES = (SCHEDULE, *RIVALS)
 def optimum_figure(results: Results) -> Figure:
     """Percent above the least delay over demand, on three, four and five arms."""
     rows = results.good
-    figure, panels = plots.panels(
-        11.5, 5.4, 3, left=0.07, right=0.99, top=0.735, bottom=0.135, wspace=0.06
-    )
-    for axes, arms in zip(panels, (3, 4, 5), strict=True):
-        chosen = rows[rows["arms"] == arms]
-        plots.draw_means(axes, chosen, ABOVE.name, SERIES)
-        style.plot_axes(axes, f"{arms} arms", plots.DENSITY_LABEL, "")
+    columns = [Panel(f"{n} arms", rows[rows["arms"] == n], ABOVE.name) for n in (3, 4, 5)]
+    figure, grid = panels_by_family(SERIES, columns, left=0.08)
+    for axes in grid.flat:
         plots.log_time(axes, 5.0, 40_000.0)
         plots.density_axis(axes, rows["density"])
-    panels[0].set_ylabel("mean delay above the least possible [%], logarithmic", **style.LABEL)
+    for axes in grid[:, 0]:
+        axes.set_ylabel("mean delay above the least\npossible [%], logarithmic", **style.LABEL)
     note = (
-        f"{missing_note(results)}  Vehicles come for half of that time, and every one counts.  The "
-        "schedule knows all arrivals beforehand."
+        f"{missing_note(results)}  Vehicles come for half of that time, and every one counts.  95 "
+        "% intervals over seeds.  The schedule knows all arrivals beforehand."
     )
-    looks = map(style.look, SERIES)
     title = "Mean delay above the least that is possible, profile fair"
-    plots.frame(figure, title, looks, note, ncols=4)
+    plots.frame(figure, title, (), note)
     return figure
 
 
@@ -50,7 +47,7 @@ def optimum_table(results: Results) -> Table:
         rows.append((f"{arms}", "least delay [s]", *_cells(once, LEAST.name, 2)))
         for name in SERIES:
             chosen = good[good["series"] == name]
-            rows.append((f"{arms}", label_of(name), *_cells(chosen, ABOVE.name, 0)))
+            rows.append((f"{arms}", style.look(name).label, *_cells(chosen, ABOVE.name, 0)))
     return Table(
         "Mean delay above the least possible [%], with 95 % intervals",
         ("arms", "controller", *(f"{density:g} veh/h/lane" for density in DENSITIES)),

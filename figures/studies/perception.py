@@ -35,8 +35,8 @@ def perception_figure(results: Results, series: str) -> Figure:
     rows = outcomes.select(with_total_delay(results.good), series=series)
     parts = list(product(KINDS, outcomes.OUTCOMES))
     figure, panels = plots.panels(
-        11.5, 7.4, len(parts), rows=len(KINDS), sharey=False, left=0.062, right=0.988, top=0.815,
-        bottom=0.095, wspace=0.22, hspace=0.42,
+        11.5, 7.4, len(parts), rows=len(KINDS), sharey=False, left=0.07, right=0.988, top=0.815,
+        bottom=0.095, wspace=0.28, hspace=0.42,
     )  # fmt: skip
     silent = rows[rows["unsignalled"].astype(bool)]
     signalled = rows[~rows["unsignalled"].astype(bool)]

@@ -12,7 +12,21 @@ carries out the commands that the session returns. Only a plan with a period wak
 
 from __future__ import annotations
 
-from minisim.control.commands import Advise, Brake, Close, Command, Go, Hold, Open, Reserve, Wake
+from minisim.control.commands import (
+    TO_LANES,
+    TO_VEHICLES,
+    Accelerate,
+    Advise,
+    Brake,
+    Close,
+    Command,
+    Go,
+    Hold,
+    Open,
+    Reserve,
+    Wake,
+    check_command,
+)
 from minisim.control.cover import NOTHING, ORDINARY, Cover, cover_of
 from minisim.control.plan import Marking, Plan
 from minisim.control.protocols import Controller, Counting, Kinds, Session, as_controller, keeps
@@ -20,9 +34,11 @@ from minisim.control.radio import Radio
 from minisim.control.silent import External, Unregulated
 from minisim.control.site import LATERAL_ACCELERATION, Site
 from minisim.control.view import (
+    AT_LINE,
     COMMIT_MARGIN,
     HALTING,
     NO_REPORTS,
+    SUMO_AT_LINE,
     Observed,
     Report,
     View,
@@ -31,12 +47,17 @@ from minisim.control.view import (
 )
 
 __all__ = [
+    "AT_LINE",
     "COMMIT_MARGIN",
     "HALTING",
     "LATERAL_ACCELERATION",
     "NOTHING",
     "NO_REPORTS",
     "ORDINARY",
+    "SUMO_AT_LINE",
+    "TO_LANES",
+    "TO_VEHICLES",
+    "Accelerate",
     "Advise",
     "Brake",
     "Close",
@@ -62,6 +83,7 @@ __all__ = [
     "Wake",
     "as_controller",
     "can_stop",
+    "check_command",
     "cover_of",
     "keeps",
     "stopping_distance",

@@ -16,6 +16,10 @@ COMMIT_MARGIN = 0.1
 #: A vehicle no faster than this stands or waits [m/s]: SUMO's `SUMO_const_haltingSpeed`.
 HALTING = 0.1
 
+#: A vehicle that stands for want of a right of way has its front at most this far before its hold
+#: line [m], one that drives by SUMO's own rules at most `SUMO_AT_LINE`: it stops 1.001 m off.
+AT_LINE, SUMO_AT_LINE = 1.0, 1.01
+
 
 class Observed(NamedTuple):
     """One vehicle in a view.
@@ -61,6 +65,7 @@ class Report(NamedTuple):
 
     time: float  # when it was sent [s]
     holds: bool  # whether the vehicle then had the right of way
+    follows: bool = True  # whether it then followed all that it has been told, but for promises
 
 
 #: If no message fails.

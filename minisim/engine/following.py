@@ -57,6 +57,7 @@ from minisim.laws import (
     drive,
     hold,
     keep_room,
+    obey,
     room_behind,
     slow_down,
 )
@@ -235,11 +236,14 @@ def choose(
 def careful(
     floats: Floats, ints: Ints, vehicles: Records, lanes: Records, layout: Layout, law: Law, i: int
 ) -> None:
-    """`choose` for a vehicle that may have to slow down, or has an advised speed."""
+    """`choose` for a vehicle that may have to slow down, or that a command drives."""
     s, v, z, p = floats[S, i], floats[V, i], floats[CLOSENESS, i], ints[PATH, i]
     me, mine = vehicles[ints[ROW, i]], layout.types[ints[TYPE, i]]
     start, speed = layout.section_start, layout.section_speed
-    acc = drive(v, floats[LIMIT, i], me["advice"], z, mine, law)
+    if me["told"] < math.inf:
+        acc = obey(me["told"], v, min(floats[LIMIT, i], me["advice"]), z, mine, law)
+    else:
+        acc = drive(v, floats[LIMIT, i], me["advice"], z, mine, law)
     k = ints[SECTION, i] + 1
     while braking_begins(v, start[p, k] - s, mine, law):
         lower = speed[p, k] * me["factor"]

@@ -120,7 +120,7 @@ def happenings(
         leave = max(layout.ends[p, 0] + floats[LENGTH, i], law.leave)
         if s >= law.entry and ints[CLEARED, i] == 0 and s >= leave:
             ints[CLEARED, i] = me["cleared"] = 1
-            me["brake"] = floats[BRAKE, i] = math.inf
+            me["brake"] = floats[BRAKE, i] = me["told"] = math.inf
             if law.wake_on_clear:
                 reasons |= CLEAR
         if s >= law.entry and s >= layout.ends[p, 1] - law.margin:

@@ -184,7 +184,9 @@ def beware(floats: Floats, ints: Ints, vehicles: Records, layout: Layout, law: L
     if s < law.entry:
         # `hold` keeps a vehicle that stands 1 mm before its line where it is.
         care = min(care, law.entry if ints[RELEASED, i] else law.hold - STOP_MARGIN - 1e-3)
-    floats[CARE, i] = care if vehicles[ints[ROW, i]]["advice"] == math.inf else -math.inf
+    me = vehicles[ints[ROW, i]]
+    free = me["advice"] == math.inf and me["told"] == math.inf
+    floats[CARE, i] = care if free else -math.inf
 
 
 @njit_inner

@@ -53,6 +53,7 @@ VEHICLE = np.dtype(
         ("cleared", np.int64),  # rear bumper has left the junction
         ("go", np.int64),  # has a right of way of its own
         ("advice", np.float64),  # cap on its speed [m/s]
+        ("told", np.float64),  # acceleration in place of its wish [m/s²], or infinite
         ("brake", np.float64),  # cap on its acceleration [m/s²]: negative, or infinite
         ("depart_tick", np.int64),
         ("arrival_tick", np.int64),
@@ -204,7 +205,7 @@ def build_vehicles(site: Site, arrivals: Arrivals) -> Records:
     vehicles["factor"] = _speed_factors(site, vehicles) if factors is None else factors[order]
     for name in ("ahead", "depart_tick", "arrival_tick"):
         vehicles[name] = -1
-    for name in ("advice", "brake"):
+    for name in ("advice", "told", "brake"):
         vehicles[name] = np.inf
     return vehicles
 

@@ -19,8 +19,9 @@ each lane, right of way is given from front to back, so those that hold it can l
 their turn.
 
 A `Reserve` does not wait for vehicles in conflict: the session answers for it, since it knows when
-the vehicle will be where. It is sent once, takes effect at a time that both know (all clocks are
-right), and is void if it comes later.
+the vehicle will be where. It takes effect at a time that both know (all clocks are right), and is
+void if it comes later. Until then it is repeated every interval without waiting for an answer, as
+warnings between vehicles are (DENM: ETSI EN 302 637-3, repetition interval and duration).
 
 Lights (`Open`, `Close`) are seen, not sent.
 """

@@ -26,6 +26,7 @@ class Order(NamedTuple):
     go: bool = False
     speed: float = inf  # advised [m/s]
     braking: float = 0.0  # [m/s²]
+    acceleration: float = inf  # [m/s²]
 
 
 class Confirmed(NamedTuple):

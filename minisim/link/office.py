@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
+from minisim.channel import steps
 from minisim.control import (
+    Accelerate,
     Advise,
     Brake,
     Command,
@@ -15,6 +17,7 @@ from minisim.control import (
     Observed,
     Plan,
     Report,
+    Reserve,
     Site,
     View,
 )
@@ -38,6 +41,13 @@ class File:
     revoked: int = 0  # number of the order that last took it away
 
 
+class Promise(NamedTuple):
+    """A reserved passage, and when to send it again."""
+
+    command: Reserve
+    repeat: int = 0  # [steps]
+
+
 class Office:
     """The controller's side: what it has heard, which vehicles may hold, and what it tells them."""
 
@@ -55,17 +65,23 @@ class Office:
         self._holders: dict[int, int] = {}  # that may hold -> movement
         self._wanting: dict[int, None] = {}  # to be given the right of way, in order
         self._open: dict[int, None] = {}  # whose order is not confirmed
+        self._promises: dict[int, Promise] = {}  # that can still come in time
+        self._slowest = steps(site.channel.slowest, site.dt)
 
     @property
     def talking(self) -> bool:
         """Whether it has something to say."""
-        return bool(self._open or self._wanting)
+        return bool(self._open or self._wanting or self._promises)
 
     def view(self, now: int) -> View:
         """What the session sees: by lane, then front to back."""
         files = [file for lane in self._lanes for file in lane.values()]
-        told = {it.vehicle.id: Report(time_of(it.sent, self._dt), it.holds) for it in files}
-        return View(time_of(now, self._dt), tuple(it.vehicle for it in files), told)
+        dt, waiting = self._dt, self._open
+        told = {
+            (me := it.vehicle.id): Report(time_of(it.sent, dt), it.holds, me not in waiting)
+            for it in files
+        }
+        return View(time_of(now, dt), tuple(it.vehicle for it in files), told)
 
     def reason(self, vehicle: int) -> Reason | None:
         """Why a vehicle waits, if that is due to messages."""
@@ -122,6 +138,7 @@ class Office:
         self._holders.pop(me.id, None)
         self._wanting.pop(me.id, None)
         self._open.pop(me.id, None)
+        self._promises.pop(me.id, None)
         if me.rank >= self._next[me.lane]:
             self._early[me.lane][me.rank] = None
             self._admit(me.lane)
@@ -133,6 +150,8 @@ class Office:
         if file is None:
             return
         match command:
+            case Reserve(vehicle):
+                self._promises[vehicle] = Promise(command)
             case Go(vehicle):
                 if not file.wanted:
                     file.wanted, self._wanting[vehicle] = True, None
@@ -146,11 +165,22 @@ class Office:
                 self._change(file, speed=speed)
             case Brake(vehicle, braking) if braking != file.order.braking:
                 self._change(file, braking=braking)
+            case Accelerate(vehicle, asked) if asked != file.order.acceleration:
+                self._change(file, acceleration=asked)
 
     def _change(self, file: File, **what: Any) -> None:
         file.order = file.order._replace(number=file.order.number + 1, **what)
         file.repeat = 0
         self._open[file.vehicle.id] = None
+
+    def promises(self, now: int, interval: int) -> Iterator[Reserve]:
+        """The promises to send now: each at once, and again while that is sure to come in time."""
+        for vehicle, (command, repeat) in list(self._promises.items()):
+            if time_of(now + self._slowest, self._dt) > command.time and repeat:
+                del self._promises[vehicle]
+            elif now >= repeat:
+                self._promises[vehicle] = Promise(command, now + interval)
+                yield command
 
     def orders(self, now: int, interval: int) -> Iterator[Order]:
         """Give the right of way where that is safe; what to send now."""

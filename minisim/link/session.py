@@ -8,14 +8,11 @@ from typing import Any
 
 from minisim.channel import Air, Chances, Channel, steps
 from minisim.control import (
-    Advise,
-    Brake,
+    TO_VEHICLES,
     Command,
     Controller,
     Counting,
     Cover,
-    Go,
-    Hold,
     Plan,
     Radio,
     Reserve,
@@ -24,11 +21,12 @@ from minisim.control import (
     View,
     Wake,
     as_controller,
+    check_command,
     cover_of,
     keeps,
 )
 from minisim.errors import InputError, show
-from minisim.hosting import Alarm, check_command, listed
+from minisim.hosting import Alarm, listed
 from minisim.link.messages import Confirmed, Order, Status
 from minisim.link.office import Office
 from minisim.link.vehicles import Vehicles
@@ -158,6 +156,8 @@ class Link:
                 self._down.send(now, Confirmed(status.vehicle.id))
         if wake:
             commands += self._decide(now)
+        for promise in office.promises(now, self._interval):
+            self._down.send(now, promise)
         for order in office.orders(now, self._interval):
             self._down.send(now, order)
         for message in self._down.receive(now):
@@ -175,9 +175,7 @@ class Link:
             check_command(command, now, self._site)
             if isinstance(command, Wake):
                 self._alarm.set(command)
-            elif isinstance(command, Reserve):
-                self._down.send(now, command)
-            elif isinstance(command, Go | Hold | Advise | Brake):
+            elif isinstance(command, TO_VEHICLES):
                 self._office.take(command)
             else:
                 yield command

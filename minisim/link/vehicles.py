@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from math import inf
 
 from minisim.control import (
+    Accelerate,
     Advise,
     Brake,
     Command,
@@ -83,10 +85,14 @@ class Vehicles:
             if unit.reserved is not None and unit.reserved.time <= time:
                 unit.passage, unit.reserved, unit.holds = unit.reserved, None, True
                 yield Go(vehicle)
+                if unit.order.speed < inf:
+                    yield Advise(vehicle, inf)
             me = self._present[vehicle]
             if unit.passage is not None and not unit.passage.keeps(me, time) and self._stops(me):
                 unit.passage, unit.holds = None, False
                 yield Hold(vehicle)
+                if unit.order.speed < inf:
+                    yield Advise(vehicle, unit.order.speed)
 
     def obey(self, message: Order | Reserve | Confirmed, now: int) -> Iterator[Command]:
         """Do what a message says."""
@@ -96,23 +102,26 @@ class Vehicles:
         elif unit is None:
             return
         elif isinstance(message, Reserve):
-            if time_of(now, self._dt) <= message.time:
+            if time_of(now, self._dt) <= message.time and message is not unit.passage:
                 unit.reserved = message
         elif message.number > unit.order.number:
             yield from self._follow(unit, message)
 
     def _follow(self, unit: Unit, new: Order) -> Iterator[Command]:
         old, unit.order = unit.order, new
-        if new.go and not unit.holds:
-            unit.holds = True
-            yield Go(new.vehicle)
-        elif unit.holds and not new.go and self._stops(self._present[new.vehicle]):
-            unit.holds, unit.passage, unit.reserved = False, None, None
-            yield Hold(new.vehicle)
-        if new.speed != old.speed:
-            yield Advise(new.vehicle, new.speed)
+        if unit.passage is None:
+            if new.go and not unit.holds:
+                unit.holds = True
+                yield Go(new.vehicle)
+            elif unit.holds and not new.go and self._stops(self._present[new.vehicle]):
+                unit.holds = False
+                yield Hold(new.vehicle)
+            if new.speed != old.speed:
+                yield Advise(new.vehicle, new.speed)
         if new.braking != old.braking:
             yield Brake(new.vehicle, new.braking)
+        if new.acceleration != old.acceleration:
+            yield Accelerate(new.vehicle, new.acceleration)
 
     def _stops(self, me: Observed) -> bool:
         return can_stop(me, self._brakes[me.type])

@@ -7,14 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from minisim.control import Radio
+from minisim.control import TO_VEHICLES, Radio
 from minisim.errors import InputError
 
 if TYPE_CHECKING:
     from minisim.results.run import Run
-
-#: The commands that reach vehicles, not lanes or the host.
-TO_VEHICLES = ("Go", "Hold", "Advise", "Brake")
 
 
 def messages(run: Run) -> int:
@@ -34,7 +31,7 @@ def _sent(run: Run, sizes: Callable[[Radio], tuple[int, int]]) -> int:
     state, command = sizes(radio)
     if (states := run.counts.get("states_sent")) is not None:  # by `minisim.link`
         return int(states) * state + int(run.counts["orders_sent"]) * command
-    told = sum(run.exchange.get(kind, 0) for kind in TO_VEHICLES)
+    told = sum(run.exchange.get(kind.__name__, 0) for kind in TO_VEHICLES)
     return run.exchange.get("shown", 0) * state + told * command
 
 

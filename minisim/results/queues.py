@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from minisim.control import HALTING
-from minisim.junction.movements import ARM_NAMES
+from minisim.junction.movements import ARM_NAMES, Bools
 from minisim.results.tracks import entry_times, whole_tracks
 from minisim.results.trips import Floats, Ints
 from minisim.ticks import first_tick
@@ -21,6 +21,10 @@ if TYPE_CHECKING:
 #: `speedThreshold` and `timeThreshold` (page Simulation/Output/Lanearea Detectors).
 JAM_SPEED: Final = 5.0 / 3.6
 JAM_TIME: Final = 1.0
+
+#: One that has stood stays in the queue up to this speed [m/s], so that it does not leave whenever
+#: it moves up: the end of the queue condition of PTV Vissim's queue counters, by default 10 km/h.
+QUEUE_END: Final = 10.0 / 3.6
 
 #: The first vehicle of a queue with a saturation headway: those before it are still starting up
 #: (Highway Capacity Manual, 6th ed., 2016, chapter 31, field measurement of saturation flow rate).
@@ -69,6 +73,17 @@ def _counted(run: Run) -> Ints:
     np.add.at(change, (went[here], trips.lane[here]), -1)
     before = change[:end].cumsum(axis=0)
     return np.stack([on_road, before], axis=-1)[start:]
+
+
+def queueing(speed: Floats, first: Bools) -> Bools:
+    """Whether vehicles stand, or have moved up no faster than `QUEUE_END` since, shape (rows,).
+
+    Rows [m/s] are sorted by vehicle, then by time; `first` are those of new vehicles.
+    """
+    index, stands = np.arange(len(speed)), speed <= HALTING
+    stood = np.maximum.accumulate(np.where(stands, index, -1))
+    left = np.maximum.accumulate(np.where((speed > QUEUE_END) | (first & ~stands), index, -1))
+    return np.asarray(stood > left)
 
 
 def saturation_headways(run: Run) -> Floats:

@@ -20,7 +20,7 @@ from minisim.errors import InputError
 from minisim.junction.movements import ARM_NAMES
 from minisim.names import name_of
 from minisim.reasons import Reason, Shown, Told
-from minisim.results.metrics import Asked
+from minisim.results.asked import Asked
 from minisim.results.summary import summarise, trip_table
 from minisim.results.tracks import Tracks, tracks_of
 from minisim.results.trajectories import TRAJECTORY_COLUMNS, TYPE
@@ -31,7 +31,7 @@ from minisim.version import __version__
 if TYPE_CHECKING:
     import pandas as pd
 
-    from minisim.results.safety import Encounters
+    from minisim.results.encounters import Encounters
     from minisim.results.why import Account
 
 
@@ -145,7 +145,7 @@ class Run:
     @cached_property
     def encounters(self) -> Encounters:
         """Each encounter of two vehicles in and near the junction; `InputError` if not recorded."""
-        from minisim.results.safety import encounters_of
+        from minisim.results.encounters import encounters_of
 
         return encounters_of(self)
 

@@ -11,8 +11,9 @@ import numpy as np
 
 from minisim.errors import InputError, choice, items
 from minisim.junction.movements import ARM_NAMES
+from minisim.results.asked import Asked, asked_metrics
 from minisim.results.metric import GROUPS, SPREAD, Metric
-from minisim.results.metrics import MEANS, METRICS, USUAL, Asked, asked_metrics
+from minisim.results.metrics import MEANS, METRICS, USUAL
 from minisim.results.spillback import spillback
 from minisim.results.trips import Ints, Trips
 

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from minisim.carfollowing import cruise_control
-from minisim.engine.cruise.law import FASTEST, Cruise, follow, realise
+from minisim.engine.cruise.law import FASTEST, Cruise, follow, obey, realise
 from minisim.errors import InputError
 from minisim.laws import STOP_MARGIN, hold
 from minisim.sumo.messages import Job
@@ -51,7 +51,7 @@ class Cruiser(Steering):
     """Steers SUMO's `CC` as a cruise control with ACC, through its desired speed."""
 
     def __init__(self, job: Job, libsumo: Any, cruise: Cruise) -> None:
-        super().__init__(job.law, libsumo)
+        super().__init__(job, job.law, libsumo)
         self._cruise, law = cruise, job.law
         self._limit = job.layout.section_speed[:, 0]
         top = max(cruise.cruise_speed, job.layout.section_speed.max())
@@ -80,27 +80,36 @@ class Cruiser(Steering):
     def steer(self, lanes: Sequence[Sequence[Car]], released: Released) -> None:
         """Brake for hold lines and on command, if the model itself brakes less."""
         law = self._law
+        if any(car.told < math.inf for lane in lanes for car in lane):
+            self._enter(lanes)
         for lane in lanes:
-            ahead = None
-            for car in lane:
+            for k, car in enumerate(lane):
                 acc = -car.brake if car.brake > 0.0 else math.inf
                 held = car.s < law.entry and not released(car)
                 if held and near(car.v, law.hold - car.s, car.traits, law):
                     acc = min(acc, max(hold(car.v, car.s, car.traits, law), -car.traits.b_max))
-                if acc < math.inf and acc < self._own(car, ahead):
-                    self.command(car, car.v + acc * law.dt)
+                told = car.told < math.inf
+                own = self._own(car, lane[:k]) if told or acc < math.inf else -math.inf
+                if told or acc < own:
+                    self.command(car, car.v + min(acc, own) * law.dt)
                 else:
                     self.release(car)
-                ahead = car
 
-    def _own(self, car: Car, ahead: Car | None) -> float:
-        """The model's acceleration on the approach if no command replaces it [m/s²]."""
+    def _own(self, car: Car, lane: Sequence[Car]) -> float:
+        """The acceleration of the model on the approach, or of a car that is told one [m/s²].
+
+        `lane` is ahead of it in its own lane.
+        """
         law, cruise = self._law, self._cruise
         v0 = self._desired(car)
         u = cruise_control(car.v, v0, cruise.cruise_gain, cruise.a, cruise.b)
-        if ahead is not None:
-            gap = ahead.s - ahead.traits.length - car.traits.min_gap - car.s
-            u = min(u, follow(car.v, gap, ahead.v, law, cruise))
+        if car.told < math.inf:
+            u = obey(car.told, car.v, car.advice, law, cruise)
+            gaps = [*self._leading(car, lane), *self._merging(car), *self._leaving(car)]
+        else:
+            gaps = [(it.s - it.traits.length - car.s, it) for it in lane[-1:]]
+        for gap, ahead in gaps:
+            u = min(u, follow(car.v, gap - car.traits.min_gap, ahead.v, law, cruise))
         u = min(u, (FASTEST * v0 / self._limit[car.path] - car.v) / law.dt)
         return realise(car.v, car.a, u, law, cruise)
 

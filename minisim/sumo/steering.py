@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import takewhile
 from typing import Any
 
@@ -39,7 +39,7 @@ class Car:
     __slots__ = (
         "a", "advice", "brake", "cleared", "commanded", "demand_time", "desired", "factor", "go",
         "id", "ignoring", "lane", "lost_ticks", "mark", "name", "path", "present", "rank", "row",
-        "s", "section", "seen", "traits", "type", "v",
+        "s", "section", "seen", "told", "traits", "type", "v",
     )  # fmt: skip
 
     def __init__(self, row: int, record: Records, types: Sequence[Traits], law: Law) -> None:
@@ -61,9 +61,12 @@ class Car:
         self.seen = 0  # tick of the last look at it
         self.present = False  # on the road
         self.go = self.cleared = self.commanded = self.ignoring = False
-        self.advice = math.inf
+        self.advice = self.told = math.inf
         self.desired = math.inf  # the last value given to SUMO
 
+
+#: The distance to the rear of a vehicle ahead [m], and that vehicle.
+Gap = tuple[float, Car]
 
 #: Whether a vehicle has the right of way, on its own or through its lane.
 Released = Callable[[Car], bool]
@@ -74,8 +77,12 @@ class Steering(ABC):
 
     near = -math.inf  #: `s` from which vehicles have to be steered in every step [m]
 
-    def __init__(self, law: Law, libsumo: Any) -> None:
+    def __init__(self, job: Job, law: Law, libsumo: Any) -> None:
         self._law, self._vehicle = law, libsumo.vehicle
+        self._exit = [(float(end[0]), int(end[2])) for end in job.layout.ends]
+        self._branch = job.layout.branch
+        self._inside: list[Car] = []  # in the order in which they entered the junction
+        self._out: dict[int, Car] = {}  # the last one that left the junction by each arm
 
     def load(self, cars: Iterable[Car]) -> None:  # noqa: B027  (does nothing by default)
         """Called when SUMO knows the vehicles, before any is on the road."""
@@ -97,10 +104,48 @@ class Steering(ABC):
         car.commanded = True
 
     def release(self, car: Car) -> None:
-        """Leave the car to the model, as when it has left the junction."""
+        """Leave the car to the model."""
         if car.commanded:
             self._vehicle.setSpeed(car.name, -1.0)
             car.commanded = False
+
+    def clear(self, car: Car) -> None:
+        """Leave the car to the model for good: it has left the junction."""
+        self._out[self._exit[car.path][1]] = car
+        self.release(car)
+
+    def _enter(self, lanes: Sequence[Sequence[Car]]) -> None:
+        """Note which cars are inside the junction."""
+        self._inside = [car for car in self._inside if not car.cleared]
+        ids = {car.id for car in self._inside}
+        entered = (car for lane in lanes for car in lane if car.s >= self._law.entry)
+        self._inside += [car for car in entered if car.id not in ids]
+
+    def _leading(self, car: Car, lane: Sequence[Car]) -> Iterator[Gap]:
+        """The vehicle of its own lane that this car follows, if any; `lane` is ahead of it."""
+        for ahead in reversed(lane):
+            rear = ahead.s - ahead.traits.length
+            if rear < self._branch[ahead.path, car.path]:
+                yield rear - car.s, ahead
+                return
+
+    def _merging(self, car: Car) -> Iterator[Gap]:
+        """The vehicle from another lane that takes the same exit before this car, if any."""
+        arm = self._exit[car.path][1]
+        before = takewhile(lambda other: other is not car, self._inside)
+        merging = [it for it in before if it.lane != car.lane and self._exit[it.path][1] == arm]
+        yield from (self._behind(car, ahead) for ahead in merging[-1:])
+
+    def _leaving(self, car: Car) -> Iterator[Gap]:
+        """The vehicle that was the last to leave the junction by the exit of this car, if any."""
+        ahead = self._out.get(self._exit[car.path][1])
+        if ahead is not None and ahead.present:
+            yield self._behind(car, ahead)
+
+    def _behind(self, car: Car, ahead: Car) -> Gap:
+        """The gap to a vehicle, both measured from their exit."""
+        mine, other = self._exit[car.path][0], self._exit[ahead.path][0]
+        return (ahead.s - other) - ahead.traits.length - (car.s - mine), ahead
 
 
 class Follower(Steering):
@@ -109,14 +154,11 @@ class Follower(Steering):
     def __init__(self, job: Job, libsumo: Any) -> None:
         # SUMO's Krauss may drive vehicles with another law.
         law = job.law if job.model == "IDM" else job.law._replace(model=laws.KRAUSS)
-        super().__init__(law, libsumo)
+        super().__init__(job, law, libsumo)
         self._limits = limits(job)
         apart, exits = job.movements.apart, job.movements.exits
         crossed = apart & (exits[:, None] != exits)  # sharing neither lane nor exit
         self._crossing = [frozenset(np.flatnonzero(row).tolist()) for row in crossed]
-        self._exit = [(float(end[0]), int(end[2])) for end in job.layout.ends]
-        self._branch = job.layout.branch
-        self._inside: list[Car] = []  # in the order in which they entered the junction
 
     def depart(self, car: Car) -> None:
         """Let the controller alone decide."""
@@ -125,50 +167,50 @@ class Follower(Steering):
     def steer(self, lanes: Sequence[Sequence[Car]], released: Released) -> None:
         """Tell SUMO what the road ahead asks of each vehicle up to the exit in the next step."""
         entry = self._law.entry
-        self._inside = [car for car in self._inside if not car.cleared]
-        ids = {car.id for car in self._inside}
-        entered = (car for lane in lanes for car in lane if car.s >= entry)
-        self._inside += [car for car in entered if car.id not in ids]
+        self._enter(lanes)
         inside = {car.path for car in self._inside}
+        told = any(car.told < math.inf for lane in lanes for car in lane)
+        wary = told or any(car.brake > 0.0 for lane in lanes for car in lane)
         for lane in lanes:
             foremost = True  # on the approach; it also follows vehicles from other lanes
             for k, car in enumerate(lane):
                 held = car.s < entry and not released(car)
                 crossed = not inside.isdisjoint(self._crossing[car.path])
-                merges = crossed and not held and (car.s >= entry or foremost)
+                alone = crossed or car.told < math.inf  # SUMO does not follow for it
+                merges = alone and not held and (car.s >= entry or foremost)
                 foremost &= car.s >= entry
-                self._steer(car, lane[:k], held, self._merging(car) if merges else 0.0)
+                z = self._closeness(car, self._merging(car)) if merges else 0.0
+                ahead = [*self._leading(car, lane[:k])] if wary else []
+                if told:  # else no look at those that have left is recent
+                    ahead += self._leaving(car)
+                self._steer(car, lane[:k], held, z, ahead)
                 ignoring = held or crossed
                 if ignoring != car.ignoring:
                     self._vehicle.setSpeedMode(car.name, IGNORING if ignoring else FOLLOWING)
                     car.ignoring = ignoring
 
-    def release(self, car: Car) -> None:
-        """Leave the car to SUMO, at the exit's speed limit."""
+    def clear(self, car: Car) -> None:
+        """Leave the car to SUMO for good, at the exit's speed limit."""
         limit = self._limits[car.path][1][car.section]
         self._desire(car, min(limit * car.factor, car.advice))
-        super().release(car)
+        super().clear(car)
 
-    def _merging(self, car: Car) -> float:
-        """Closeness to the vehicle from another lane that takes the same exit before this car."""
-        mine, arm = self._exit[car.path]
-        before = takewhile(lambda other: other is not car, self._inside)
-        merging = [it for it in before if it.lane != car.lane and self._exit[it.path][1] == arm]
-        if not merging:
-            return 0.0
-        ahead = merging[-1]
-        gap = (ahead.s - self._exit[ahead.path][0]) - ahead.traits.length - (car.s - mine)
-        return float(laws.closeness(car.v, gap, ahead.v, car.traits, self._law))
+    def _closeness(self, car: Car, ahead: Iterable[Gap]) -> float:
+        """The most that the law asks for behind these vehicles; 0 if there are none."""
+        me, law = car.traits, self._law
+        asked = [float(laws.closeness(car.v, gap, it.v, me, law)) for gap, it in ahead]
+        return max(asked, default=0.0)
 
-    def _leading(self, car: Car, lane: Sequence[Car]) -> float:
-        """Closeness to the vehicle of its own lane that this car follows; `lane` is ahead of it."""
-        for ahead in reversed(lane):
-            rear = ahead.s - ahead.traits.length
-            if rear < self._branch[ahead.path, car.path]:
-                return float(laws.closeness(car.v, rear - car.s, ahead.v, car.traits, self._law))
-        return 0.0
+    def _room(self, car: Car, ahead: Iterable[Gap]) -> float:
+        """The room in which the car must be able to stop behind these; see `laws.room_behind`."""
+        me, law = car.traits, self._law
+        rooms = [laws.room_behind(gap, it.v, it.traits.b_max, me, law) for gap, it in ahead]
+        return float(min(rooms, default=math.inf))
 
-    def _steer(self, car: Car, lane: Sequence[Car], held: bool, z: float) -> None:
+    def _steer(
+        self, car: Car, lane: Sequence[Car], held: bool, z: float, ahead: Sequence[Gap]
+    ) -> None:
+        """Steer a car; it keeps room behind `ahead`, which commands may make brake hard."""
         law, me = self._law, car.traits
         v, s, section = car.v, car.s, car.section
         starts, speeds = self._limits[car.path]
@@ -179,12 +221,13 @@ class Follower(Steering):
         held = held and near(v, law.hold - s, me, law)
         # SUMO would drop to a lower desired speed at once, so the law does the braking.
         self._desire(car, max(v0, v))
-        must_slow = v > v0 or v0 < LEAST_SPEED
-        if not (slower or held or car.brake > 0.0 or must_slow or z > 0.0):
-            super().release(car)
+        room = self._room(car, ahead)
+        tight = laws.short_of(room, v, v + me.a * law.dt, me, law)
+        ours = v > v0 or v0 < LEAST_SPEED or car.told < math.inf or tight
+        if not (slower or held or car.brake > 0.0 or ours or z > 0.0):
+            self.release(car)
             return
-        free = laws.drive(v, limit, car.advice, 0.0, me, law)
-        acc = laws.drive(v, limit, car.advice, z, me, law)
+        free, acc = self._drive(car, limit, 0.0), self._drive(car, limit, z)
         while laws.braking_begins(v, starts[k] - s, me, law):
             lower = speeds[k] * car.factor
             acc = min(acc, laws.slow_down(v, acc, lower, starts[k] - s, me, law))
@@ -193,12 +236,21 @@ class Follower(Steering):
             acc = min(acc, laws.hold(v, s, me, law))
         if car.brake > 0.0:
             acc = min(acc, -car.brake)
-        if acc < free or must_slow:
-            z = max(z, self._leading(car, lane))
-            acc = min(acc, laws.drive(v, limit, car.advice, z, me, law))
+        if acc < free or ours:
+            z = max(z, self._closeness(car, ahead or self._leading(car, lane)))
+            acc = min(acc, self._drive(car, limit, z))
+            if tight:
+                acc = min(acc, float(laws.keep_room(v, room, me, law)))
             self.command(car, v + max(acc, -me.b_max) * law.dt)
         else:
-            super().release(car)
+            self.release(car)
+
+    def _drive(self, car: Car, limit: float, z: float) -> float:
+        """The acceleration by the law, or by what the car is told."""
+        if car.told < math.inf:
+            limit = min(limit, car.advice)
+            return float(laws.obey(car.told, car.v, limit, z, car.traits, self._law))
+        return float(laws.drive(car.v, limit, car.advice, z, car.traits, self._law))
 
     def _desire(self, car: Car, speed: float) -> None:
         speed = max(speed, LEAST_SPEED)

@@ -18,7 +18,18 @@ from typing import Any
 
 import numpy as np
 
-from minisim.control import Advise, Brake, Close, Command, Go, Hold, Observed, Open, Wake
+from minisim.control import (
+    Accelerate,
+    Advise,
+    Brake,
+    Close,
+    Command,
+    Go,
+    Hold,
+    Observed,
+    Open,
+    Wake,
+)
 from minisim.engine.collision import Collision
 from minisim.engine.state import TRACE, Records
 from minisim.hosting import Alarm
@@ -64,6 +75,7 @@ class Worker:
         needed_from = self._steering.near, law.entry - law.sight, self._marks[0], recorded_from
         # A metre earlier, so that the acceleration is already known when it is first needed.
         self._near = min(needed_from) - 1.0
+        self._watching = False  # all vehicles, always
         self._glances: dict[int, list[Car]] = defaultdict(list)
         self._lanes: list[list[Car]] = [[] for _ in range(job.movements.n)]
         self._open = [job.plan.lanes_open] * job.movements.n
@@ -153,11 +165,25 @@ class Worker:
                 car.advice = speed
                 if car.present:
                     self._steering.advise(car)
+            case Accelerate(vehicle, acceleration):
+                self._watch()
+                self._cars[str(vehicle)].told = acceleration
             case Brake(vehicle, deceleration):
                 car = self._cars[str(vehicle)]
+                if car.s < self._near:
+                    self._watch()
                 car.brake = min(deceleration, car.traits.b_max)
             case Wake():
                 self._alarm.set(command)
+
+    def _watch(self) -> None:
+        """Watch all vehicles from now on: a command drives one that may be anywhere."""
+        if not self._watching:
+            self._watching, self._near = True, -math.inf
+            self._glances.clear()
+            for car in [car for car in self._cars.values() if car.present]:
+                self._glance(car)
+                self._turn_to(car)
 
     def _released(self, car: Car) -> bool:
         return car.go or self._open[car.lane]
@@ -218,7 +244,7 @@ class Worker:
 
     def _unneeded(self, car: Car) -> bool:
         """Whether the car has passed every place where it may be needed."""
-        return car.cleared and self.job.law.record_from == NEVER
+        return car.cleared and not self._watching and self.job.law.record_from == NEVER
 
     def _glance(self, car: Car) -> None:
         s = self._locate(car)
@@ -272,7 +298,7 @@ class Worker:
         """Leave a car to SUMO alone: its rear has left the junction."""
         car.cleared = True
         self._lanes[car.lane].remove(car)
-        self._steering.release(car)
+        self._steering.clear(car)
         if self._unneeded(car):
             self._libsumo.vehicle.unsubscribe(car.name)
             self._turn_to(car)

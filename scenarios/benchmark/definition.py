@@ -1,7 +1,8 @@
 """What a benchmark consists of: a file of experiments with a name and a version, block by block.
 
-A block is a *cell*: a junction and its demand, and how vehicles that decide for themselves perceive
-and how many of them humans drive. Controllers come on top, and all have the same arrivals.
+A block is a *cell*: a junction and its demand, how vehicles that decide for themselves perceive and
+how many of them humans drive, and how messages fail. Controllers come on top, and all have the same
+arrivals.
 """
 
 from __future__ import annotations
@@ -10,15 +11,18 @@ import hashlib
 import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import asdict, dataclass, fields, is_dataclass, replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from baselines import V2IC
 from dim import Dim, ExactPerception, Perception
+from minisim.channel import Channel
 from minisim.control import Controller
 from minisim.errors import InputError, choice, instance, integer
 from minisim.files import read_file
+from minisim.link import Linked, radio_of
 from minisim.names import name_of
 from minisim.results.metric import Metric
 from minisim.results.metrics import METRICS
@@ -44,6 +48,7 @@ class Cell:
     scenario: Scenario
     perception: Perception  # of vehicles that decide for themselves
     humans: float  # share of vehicles that humans drive
+    channel: Channel  # what messages go through
 
     @property
     def name(self) -> str:
@@ -53,24 +58,28 @@ class Cell:
     @property
     def plain(self) -> bool:
         """Whether every controller can be compared on it: the overall rank is over these."""
-        return not self.humans and self.perception == ExactPerception()
+        exact = self.perception == ExactPerception()
+        return exact and not self.humans and not self.channel
 
     def recipe(self, name: str, controller: Controller, seed: int) -> Recipe:
         """The run of a controller; raises `InputError` if it cannot serve the cell.
 
-        Only a controller with a parameter `perception` errs. Those without a radio serve humans as
-        they serve any vehicle; those with one cannot, as humans send no messages.
+        Only a controller with a parameter `perception` errs, and only messages of one with a radio
+        fail. Those without a radio serve humans as they serve any vehicle; those with one cannot,
+        as humans send no messages.
         """
         humans = self.humans if isinstance(controller, Dim) else 0.0
-        if self.humans and getattr(controller, "radio", None) is not None:
+        talks = radio_of(controller) is not None
+        if self.humans and talks:
             raise InputError("needs messages from every vehicle, and humans send none")
         given: Any = controller
         perceives = is_dataclass(given) and "perception" in {it.name for it in fields(given)}
         if perceives and self.perception != ExactPerception():
             given = replace(given, perception=self.perception)
+        channel = self.channel if talks else Channel()
         return Recipe(
-            self.scenario, given, seed, humans, label=name, on_collision="record",
-            metrics=MEASURED,
+            self.scenario, given, seed, humans, **asdict(channel), label=name,
+            on_collision="record", metrics=MEASURED,
         )  # fmt: skip
 
 
@@ -134,7 +143,8 @@ def read_benchmark(path: str | os.PathLike[str] | None = None, *, quick: bool = 
     recipes = experiments_of(table, path, shorter if quick else {})
     cells: dict[str, Cell] = {}
     for it in recipes:
-        cell = Cell(it.scenario, _perception_of(it, path), it.humans)
+        channel = Channel(it.latency, it.jitter, it.loss)
+        cell = Cell(it.scenario, _perception_of(it, path), it.humans, channel)
         if cells.setdefault(cell.name, cell) != cell:
             raise InputError(
                 f"{path}: two cells are called {cell.name!r}; give each scenario a label of its own"
@@ -146,14 +156,16 @@ def read_benchmark(path: str | os.PathLike[str] | None = None, *, quick: bool = 
 def _perception_of(recipe: Recipe, path: Path) -> Perception:
     """What a block says about vehicles of DIM; `InputError` for what no cell has."""
     for it in fields(Recipe):
-        own = it.name in ("scenario", "controller", "seed", "humans")
+        own = it.name in ("scenario", "controller", "seed", "humans", "latency", "jitter", "loss")
         if not own and getattr(recipe, it.name) != it.default:
             raise InputError(f"{path}: cells have no {it.name}; leave it out")
     controller = recipe.controller
+    if controller == V2IC() and isinstance(recipe.driven, Linked):
+        return ExactPerception()
     if not isinstance(controller, Dim) or controller != Dim(perception=controller.perception):
         raise InputError(
-            f"{path}: the controller of a cell is dim, perhaps with a perception, got "
-            f"{name_of(controller)!r}; --controller says which take part"
+            f"{path}: the controller of a cell is dim, perhaps with a perception, or v2ic if "
+            f"messages fail, got {name_of(controller)!r}; --controller says which take part"
         )
     return controller.perception
 

@@ -27,7 +27,7 @@ __all__ = ["COMMANDS", "app", "main"]
 #: The help lists these first, then the others by name.
 _FIRST = (
     "demo", "run", "controllers", "animate", "lab", "sweep", "figures", "reproduce", "benchmark",
-    "crossval",
+    "crossval", "train",
 )  # fmt: skip
 
 #: The names of the commands, in the order of the help.
@@ -56,7 +56,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         _check_once(given)
         with terminable():
-            code = app(given or ["--help"], prog_name="minisim", standalone_mode=False)
+            code = app(given or ["--help"], prog_name="minisim", standalone_mode=False, obj=given)
         sys.stdout.flush()
     except MinisimError as error:
         if os.environ.get("MINISIM_TRACEBACK"):

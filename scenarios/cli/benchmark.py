@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     "the same arrivals. Writes DIR/report.md, its figures, cells.csv (means of all measures with "
     "intervals), benchmark.json (every row) and the store. Runs in the store are not repeated, so "
     "an interrupted command continues. A controller that cannot serve a cell has a row that says "
-    "so. See docs/benchmark.md.\n\n"
+    "so. See docs/howto/benchmark.md.\n\n"
     "[bold]Examples[/bold]\n\n"
     "minisim benchmark --quick\n\n"
     "minisim benchmark --add 'mine:Mine(k=3)' --out mine\n\n"

@@ -67,8 +67,9 @@ def run(
     """Simulate one run: waiting, travel and delay by lane, and how safe it is."""
     from minisim.files import check_apart, check_file, check_table
     from minisim.pcu import UNITS
+    from minisim.results.asked import asked_metrics
     from minisim.results.metric import GROUPS
-    from minisim.results.metrics import SAFETY, asked_metrics
+    from minisim.results.metrics import SAFETY
     from minisim.results.trajectories import write_fcd, write_trajectories, write_trips
     from scenarios.controllers import controller_named
     from scenarios.loading import metrics_named

@@ -161,7 +161,7 @@ def _means(results: Sequence[Result], metric: str) -> str:
 
 
 def _replays(results: Sequence[Result]) -> str:
-    """The table of `docs/fidelity.md`."""
+    """The table of `docs/background/fidelity.md`."""
     return markdown_table(
         ("controller", "arms", "split", "veh/h/lane",
          "waiting, minisim", "SUMO", "published", "travel, minisim", "SUMO", "published",

@@ -5,7 +5,7 @@
 
     env = gymnasium.make("minisim/RightOfWay-v0", scenario=four_way(density=250, horizon=600))
 
-docs/environments.md has the observations, actions and rewards.
+docs/howto/environments.md has the observations, actions and rewards.
 """
 
 from __future__ import annotations

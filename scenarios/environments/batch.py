@@ -73,6 +73,9 @@ class RightOfWayBatch(VectorEnv[Observation, npt.NDArray[np.int8], Any]):
             np.zeros(num_envs, np.int64) for _ in range(4)
         )
         self._over = np.ones(num_envs, bool)
+        self.conflicts = site.conflicts
+        #: How many vehicles want to come in the present run of each junction.
+        self.vehicles = np.zeros(num_envs, np.int64)
         self._seen = np.zeros((num_envs, n * (m // n + 5) + m), np.float32)
         self._masks = np.zeros((num_envs, m), np.int8)
         self._layout = build_layout(site, one.plan)
@@ -153,6 +156,7 @@ class RightOfWayBatch(VectorEnv[Observation, npt.NDArray[np.int8], Any]):
         for whole, part in zip(self._worlds, (*pack, vehicles, lanes), strict=True):
             whole[k, ..., : part.shape[-1]] = part
         self._ticks[k] = self._targets[k] = 0
+        self.vehicles[k] = len(vehicles)
         self._over[k] = False
 
     def _room(self, most: int) -> tuple[Any, ...]:

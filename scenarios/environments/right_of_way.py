@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium import spaces
 
-from minisim.control import HALTING, Observed, Plan, View
+from minisim.control import HALTING, Plan, Site, View
 from minisim.errors import instance
 from scenarios.environments.environment import Environment, Observation, box
 from scenarios.environments.passing import Passing
@@ -80,23 +80,7 @@ class RightOfWayEnv(Environment):
         world.sim.run_until("collision", before=world.next_action)
 
     def _observe(self, view: View) -> Observation:
-        passing, width = self._passing, 5 + self._turns
-        seen = np.zeros(self._n * width + self._m, np.float32)
-        junction = passing.look(view)
-        for v in junction.asking:
-            at = v.lane * width
-            seen[at : at + 4] = self._first(v, view.time)
-            seen[at + 3 + v.manoeuvre] = 1.0
-        for v in view.vehicles:
-            if v.speed <= HALTING and v.distance >= 0.0:
-                seen[v.lane * width + width - 1] += 1.0 / MANY
-        for v in junction.settled:
-            seen[self._n * width + passing.movement(v)] = 1.0
-        return np.minimum(seen, 1.0)
-
-    def _first(self, v: Observed, time: float) -> tuple[float, float, float, float]:
-        speed = v.speed / self.world.site.limit(v.lane)
-        return 1.0, v.distance / self._sight, speed, (time - v.demand_time) / LONG
+        return observed(view, self._passing, self.world.site, self._sight)
 
     def _mask(self, view: View) -> npt.NDArray[np.int8]:
         mask = np.zeros(self._m, np.int8)
@@ -105,3 +89,22 @@ class RightOfWayEnv(Environment):
             if not self._masked or self._passing.possible(v, junction.settled):
                 mask[self._passing.movement(v)] = 1
         return mask
+
+
+def observed(view: View, passing: Passing, site: Site, sight: float) -> Observation:
+    """What the agent of `RightOfWayEnv` sees of a view that shows the whole road."""
+    n, m = site.intersection.n, len(site.intersection.movements)
+    width = 5 + m // n
+    seen = np.zeros(n * width + m, np.float32)
+    junction = passing.look(view)
+    for v in junction.asking:
+        at = v.lane * width
+        waited = (view.time - v.demand_time) / LONG
+        seen[at : at + 4] = 1.0, v.distance / sight, v.speed / site.limit(v.lane), waited
+        seen[at + 3 + v.manoeuvre] = 1.0
+    for v in view.vehicles:
+        if v.speed <= HALTING and v.distance >= 0.0:
+            seen[v.lane * width + width - 1] += 1.0 / MANY
+    for v in junction.settled:
+        seen[n * width + passing.movement(v)] = 1.0
+    return np.minimum(seen, 1.0)

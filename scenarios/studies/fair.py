@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from functools import lru_cache
 from itertools import product
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -18,8 +19,8 @@ from scenarios.sweep.cells import pairs
 if TYPE_CHECKING:
     import pandas as pd
 
-#: DIM with either gate, and the other controllers.
-GATES = ("dim", "dim:gate=harmonious")
+#: DIM with each of its gates, and the other controllers.
+GATES = ("dim", "dim:gate=harmonious", "dim:gate=passed")
 OTHERS = tuple(name for name in RIVALS if name not in GATES)
 
 #: From nearly free flow to far beyond the capacity of every controller [veh/h/lane].
@@ -119,6 +120,7 @@ def losses(rows: pd.DataFrame) -> dict[tuple[str, str, str], Crossing]:
     return known
 
 
+@lru_cache(maxsize=2)
 def needed_losses(results: Results) -> dict[tuple[str, str, str], Crossing]:
     """The `losses`; raises `MissingRunsError` if no pair has two demands in common."""
     known = {} if results.good.empty else losses(results.good)
@@ -146,9 +148,9 @@ def verdict(results: Results) -> str:
         lines.append(f"- {label_of(rival)}: {'; '.join(losing)}")
     return "\n".join([
         "Demands at which DIM does worse than each rival on four arms, paper's gate → harmonious "
-        "gate [veh/h/lane]: where that begins, with its 95 % interval; it lasts to the highest "
-        f"tried ({high:g}) unless an end is given. \"all\": from the lowest tried ({low:g}) on, on "
-        "average:\n",
+        "gate → gate passed [veh/h/lane]: where that begins, with its 95 % interval; it lasts to "
+        f"the highest tried ({high:g}) unless an end is given. \"all\": from the lowest tried "
+        f"({low:g}) on, on average:\n",
         *lines,
     ])  # fmt: skip
 

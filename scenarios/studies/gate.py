@@ -1,4 +1,4 @@
-"""The paper's gate, which waits until the junction is clear, against the harmonious one."""
+"""The paper's gate, which waits until the junction is clear, against those that do not."""
 
 from __future__ import annotations
 
@@ -9,6 +9,6 @@ from scenarios.studies.shared.study import Study
 
 STUDY = Study(
     "gate",
-    "What does entering beside crossing vehicles in harmony gain?",
+    "What does entering beside crossing vehicles gain?",
     fair_grid(GATES, (3, 4, 5), DENSITIES),
 )

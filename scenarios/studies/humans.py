@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 from scenarios.controllers import label_of
 from scenarios.statistics import Interval, mean_interval
-from scenarios.studies.fair import GATES
 from scenarios.studies.shared.points import fair
 from scenarios.studies.shared.study import TOTAL_DELAY, Results, Study, with_total_delay
 from scenarios.sweep.cells import pairs
@@ -19,6 +18,8 @@ if TYPE_CHECKING:
 SHARES = tuple(k / 10.0 for k in range(11))
 #: Demands [veh/h/lane]: a moderate one, up to one that only saturated lanes can serve.
 DENSITIES = (150.0, 250.0, 350.0, 500.0)
+#: Gates of DIM; where humans come, every gate lets vehicles in beside those in harmony.
+GATES = ("dim", "dim:gate=harmonious")
 #: The controller that humans alone are compared with.
 STOP = "all-way-stop"
 

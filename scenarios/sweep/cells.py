@@ -120,7 +120,8 @@ def pairs(
     `column`, such as "controller", has the names, and the columns `by` name a cell. Raises
     `InputError` if arrivals of one seed differ, or a controller has two runs of one seed.
     """
-    good = rows[rows["error"].isna() & rows[metric].notna()] if metric in rows else rows[:0]
+    known = rows["error"].isna() & rows[metric].notna() if metric in rows else slice(0)
+    good = rows[known].filter([*by, "seed", column, "arrivals", metric])
     one, other = (good[good[column] == name] for name in names)
     for name, runs in zip(names, (one, other), strict=True):
         if runs.duplicated([*by, "seed"]).any():
@@ -150,8 +151,8 @@ def _averaged(good: pd.DataFrame) -> dict[str, object]:
 
 def saturated(good: pd.DataFrame) -> bool:
     """Whether the queues of a cell's runs kept growing; false if the runs are `too_short`."""
-    sums = good.filter(regex="(queue_growth|trips)$").sum()
-    return not too_short(good) and grows(sums, int(good["arms"].iloc[0]))
+    counts = [name for name in good.columns if name.endswith(("queue_growth", "trips"))]
+    return not too_short(good) and grows(good[counts].sum(), int(good["arms"].iloc[0]))
 
 
 def too_short(good: pd.DataFrame) -> bool:

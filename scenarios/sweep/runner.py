@@ -12,7 +12,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from minisim.errors import ExecutorError, InputError, instance, integer, plural, show
-from minisim.results.metrics import Asked
+from minisim.results.asked import Asked
 from scenarios.loading import metrics_named
 from scenarios.recipe import Recipe
 from scenarios.sweep.keys import content_of, key_of

@@ -101,6 +101,16 @@ static inline double drive(double v, double limit, double advice, double z, cons
     return least(acc, most(told, -me->b));
 }
 
+static inline double obey(double told, double v, double limit, double z, const Type *me,
+                          const Law *law)
+{
+    const double asked = v == 0.0 ? most(told, 0.0) : told;
+    const double acc = least(asked, follow(v, INFINITY, z, me));
+    if (v + acc * law->dt > limit)
+        return least(acc, most((limit - v) / law->dt, -me->b));
+    return acc;
+}
+
 static inline bool braking_begins(double v, double distance, const Type *me, const Law *law)
 {
     return 2.0 * me->b * distance <= v * v + 4.0 * me->b * v * law->dt;
@@ -195,7 +205,10 @@ static inline bool accelerate(World *world, const Lane *lane, int64_t i)
 
     const int64_t section = p * world->sections + me->section;
     const double *start = world->start + section, *speed = world->speed + section;
-    double acc = drive(v, speed[0] * me->factor, me->advice, z, mine, law);
+    const double limit = speed[0] * me->factor;
+    double acc = me->told < INFINITY
+        ? obey(me->told, v, least(limit, me->advice), z, mine, law)
+        : drive(v, limit, me->advice, z, mine, law);
     for (int k = 1; braking_begins(v, start[k] - s, mine, law); k++)
         acc = least(acc, slow_down(v, acc, speed[k] * me->factor, start[k] - s, mine, law));
     if (!released && s < law->entry)

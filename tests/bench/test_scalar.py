@@ -59,6 +59,7 @@ def disturb(
     rows["s"][some] += draws.uniform(0.0, 9.0, count)
     rows["v"][some] += draws.uniform(0.0, 9.0, count)
     rows["advice"][some] = draws.uniform(0.0, 14.0, count)
+    rows["told"][some] = draws.choice([np.inf, np.inf, -9.0, -1.0, 0.0, 1.0, 9.0], count)
     rows["brake"][some] = draws.choice([-5.0, np.inf], count)
     rows["go"][some] = draws.integers(0, 2, count)
     lanes["open"] = draws.random(len(lanes)) < 0.2

@@ -404,7 +404,7 @@ def test_a_collision_is_counted(browser: Browser, tmp_path: Path) -> None:
     Player(scene(run, start=20.0, seconds=35.0)).save(file)
     shown = opened(browser, file, (1280, 720))
     shown.run(f"{PLAYER}.time = {PLAYER}.last")
-    assert shown.run(f"{PART}('.counts').textContent").startswith("collisions 1 · standing")
+    assert shown.run(f"{PART}('.counts').textContent").startswith("collisions 1 · in queues")
     assert shown.run(f"{PART}('.counts').textContent").endswith("served 0")
     shown.run(f"{PLAYER}.select(1)")
     assert shown.run(f"{PART}('.why').textContent").startswith(

@@ -105,7 +105,7 @@ from tests.builders import synthetic_find
 figure = item_named("gate-losses").build(Archive(synthetic_find, Effort(seeds=2)))
 print(len(figure.axes[0].get_legend_handles_labels()[0]))
 """
-    assert output(tree, "-c", code) == "2\n"
+    assert output(tree, "-c", code) == "3\n"
 
 
 def test_every_file_that_the_guide_names_exists() -> None:

@@ -17,6 +17,7 @@ from dim import AsRunDim, Dim, Mixed, Monitor, NoisyPerception
 from minisim.arrivals import Arrivals
 from minisim.channel import Channel
 from minisim.control import (
+    Accelerate,
     Advise,
     Brake,
     Close,
@@ -282,9 +283,9 @@ BROKEN = {
     "never releases": (Says(), r"(\d+) of \1 vehicles were never served on 4 arms \(lanes a, b"),
     "starves a lane": (Starting(make=never_d), r"vehicles were never served on 4 arms \(lanes d\)"),
     "unknown vehicle": (Says(answer=(Go(10**6),)), "this vehicle is not in the view"),
-    "unknown lane": (Says(answer=(Open(4),)), "there is no such lane"),
-    "past wake-up": (Says(answer=(Wake(0.0),)), "must be in the future"),
-    "no command": (Says(answer=("go",)), "this is not a command"),
+    "unknown lane": (Says(answer=(Open(4),)), "lane must be an integer 0 … 3"),
+    "past wake-up": (Says(answer=(Wake(0.0),)), "is not after 0 s"),
+    "no command": (Says(answer=("go",)), "is not a command"),
     "no answer": (Says(answer=None), "must return commands, .* got None"),
     "no session": (Starting(make=str), "must return a Session with a Plan"),
     "no plan": (Says(plan="none"), "must return a Session with a Plan"),
@@ -317,7 +318,7 @@ VIEW = View(10.0, (Observed(3, 0, 1, 5.0, 5.0, 5.0), Observed(9, 2, 1, 5.0, 5.0,
 def test_valid_commands_pass() -> None:
     valid = (
         Go(3), Hold(9), Open(0), Close(3), Advise(9, 0.0), Advise(3, math.inf), Brake(3, 4.5),
-        Brake(9, 0.0), Wake(10.1),
+        Brake(9, 0.0), Accelerate(3, -2.0), Accelerate(9, math.inf), Wake(10.1),
     )  # fmt: skip
     check_commands(valid, VIEW, small_scenario(4).site(0))
 
@@ -327,6 +328,7 @@ def test_valid_commands_pass() -> None:
     [
         Go(4), Hold(-1), Advise(10, 5.0), Advise(3, -1.0), Advise(3, math.nan), Open(4), Close(-1),
         Brake(4, 1.0), Brake(3, -1.0), Brake(3, math.nan), Brake(3, math.inf),
+        Accelerate(4, 1.0), Accelerate(3, math.nan), Accelerate(3, -math.inf),
         Wake(10.0), Wake(math.nan), Wake(math.inf), (3,), None,
     ],
 )  # fmt: skip

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 import sys
 from pathlib import Path
@@ -16,7 +17,7 @@ LESSONS = sorted(
     path for path in (ROOT / "docs/lessons").glob("*.md") if path.name != "index.md"
 )  # fmt: skip
 CELL = re.compile(
-    r"^```\{code-cell\} ipython3\n(?::tags:[^\n]*\n)?(.*?)^```", re.DOTALL | re.MULTILINE
+    r"^```\{code-cell\} ipython3\n(?::tags: ([^\n]*)\n)?(.*?)^```", re.DOTALL | re.MULTILINE
 )
 names = pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem)
 
@@ -36,6 +37,24 @@ def test_a_lesson_asks_predicts_runs_explains_and_has_exercises_with_solutions(p
 
 
 @names
+def test_what_a_reader_sees_is_enough(path: Path) -> None:
+    """Cells use no name that only a hidden cell, which the page does not show, makes."""
+    cells = CELL.findall(path.read_text(encoding="utf-8"))
+    made: dict[bool, set[str]] = {True: set(), False: set()}
+    used: set[str] = set()
+    for tags, code in cells:
+        hidden = "remove-cell" in tags
+        for node in ast.walk(ast.parse(code)):
+            if isinstance(node, ast.alias):
+                made[hidden].add(node.asname or node.name)
+            elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+                made[hidden].add(node.id)
+            elif isinstance(node, ast.Name) and not hidden:
+                used.add(node.id)
+    assert used & made[True] - made[False] == set()
+
+
+@names
 @pytest.mark.slow
 def test_the_code_of_a_lesson_runs(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from matplotlib import pyplot as plt
@@ -43,7 +62,7 @@ def test_the_code_of_a_lesson_runs(path: Path, monkeypatch: pytest.MonkeyPatch) 
     mpl.use("Agg")
     lesson = ModuleType("lesson")  # its classes can be pickled, as those of a notebook can
     monkeypatch.setitem(sys.modules, "lesson", lesson)
-    cells = CELL.findall(path.read_text(encoding="utf-8"))
+    cells = [code for _, code in CELL.findall(path.read_text(encoding="utf-8"))]
     code = "\n".join(cells)
     assert len(cells) > 5
     assert "assert " in code

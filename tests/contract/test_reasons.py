@@ -77,7 +77,7 @@ class Oracle:
             case "left":
                 assert me.distance < 0.0
                 assert not me.inside
-            case "goes" | "clique goes" | "committed" | "advised":
+            case "goes" | "clique goes" | "committed" | "advised" | "told":
                 assert goes
                 stops = can_stop(_observed(me), self.site.vehicle.deceleration)
                 assert (reason.kind == "committed") <= (not stops)

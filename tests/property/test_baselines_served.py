@@ -26,7 +26,7 @@ from minisim.control import ORDINARY, Controller, Site, cover_of
 from minisim.errors import InputError
 from minisim.junction.conflicts import CLEARANCE, conflict_zones, entry_room
 from minisim.junction.geometry import Intersection
-from minisim.results.safety import encroachments
+from minisim.results.encounters import encroachments
 from minisim.vehicle import VehicleType
 from scenarios import four_way
 from scenarios.controllers import controller_named, safe

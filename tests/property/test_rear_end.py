@@ -8,12 +8,13 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from minisim.carfollowing import ballistic, stop_within
+from minisim.results.run import Run
 from minisim.simulation import simulate
 from minisim.testing import small_scenario
 from minisim.vehicle import VehicleType
 from scenarios.controllers import controller_named
 from scenarios.strategies import floats
-from tests.builders import as_run
+from tests.builders import Pedals, as_run
 
 STEPS = st.sampled_from([0.5, 0.3, 0.2, 0.1])
 
@@ -33,6 +34,14 @@ def any_vehicle(draw: st.DrawFn) -> VehicleType:
     needed = VehicleType(max_deceleration=1000.0, **parts).needed_braking
     most = draw(st.sampled_from([1.0, 1.3, 10.0])) * needed + 1e-9
     return VehicleType(max_deceleration=min(most, 1000.0), **parts)
+
+
+def within_lanes(run: Run) -> str:
+    """The collisions of vehicles from one lane, in words."""
+    lane = run.columns.lane
+    return "; ".join(
+        str(it) for it in run.collisions if lane[it.vehicles[0]] == lane[it.vehicles[1]]
+    )
 
 
 car = partial(VehicleType, max_deceleration=1000.0)
@@ -71,9 +80,27 @@ def test_no_vehicle_runs_into_the_one_ahead(
         drain=40.0 + 120.0 / limit, arm_length=80.0 if arms > 3 else 60.0,
     )  # fmt: skip
     run = simulate(scenario, controller_named(controller), seed=2, on_collision="record")
-    lane = run.columns.lane
-    touched = [c for c in run.collisions if lane[c.vehicles[0]] == lane[c.vehicles[1]]]
-    assert not touched, str(touched[0])
+    assert not within_lanes(run)
+
+
+@given(any_vehicle(), STEPS, floats(0.5, 100.0), st.integers(0, 2**32))
+@example(car(acceleration=50.0, deceleration=1.0, headway=0.5), 0.5, 30.0, 1)
+@example(car(model="krauss", acceleration=50.0, headway=0.5, min_gap=0.5), 0.5, 30.0, 1)
+@settings(max_examples=8)
+def test_no_sequence_of_accelerations_makes_one_either(
+    vehicle: VehicleType, dt: float, limit: float, seed: int
+) -> None:
+    """Nor does it take a vehicle beyond its engine or its brakes."""
+    scenario = small_scenario(
+        3, vehicle=vehicle, dt=dt, speed_limit=limit, density=1500.0, demand_time=40.0, drain=60.0,
+        arm_length=60.0,
+    )  # fmt: skip
+    controller = Pedals(controller_named("dim"), seed)
+    run = simulate(scenario, controller, seed=2, on_collision="record", record="all")
+    assert not within_lanes(run)
+    most = vehicle.acceleration * (1.0 + 1e-6)
+    assert -vehicle.max_deceleration <= run.trace["a"].min(initial=0.0)
+    assert run.trace["a"].max(initial=0.0) <= most
 
 
 def test_the_cruise_control_of_the_published_runs_does_not_either() -> None:

@@ -34,6 +34,7 @@ from baselines import (
 )
 from dim import Dim, Mixed, NoisyPerception
 from minisim.control import (
+    Accelerate,
     Advise,
     Brake,
     Command,
@@ -59,7 +60,7 @@ from scenarios.profiles import FAIR
 from scenarios.scenario import Scenario
 from scenarios.strategies import intersections
 from tests import ROOT
-from tests.builders import Fixed, Greens, Scripted, hardest_braking, queues, replayed, share
+from tests.builders import Fixed, Greens, Pedals, Scripted, hardest_braking, queues, replayed, share
 from tests.sumo.conftest import both
 from tests.unit.scenarios.cli.test_cli import Captured, answer, fails, ok
 
@@ -169,14 +170,82 @@ def timed(
         {50.0: (Open(0),)},
         {0.0: (Go(0),), 20.0: (Brake(0, 6.0),), 30.0: (Brake(0, 0.0),)},
         {0.0: (Go(0),), 35.0: (Brake(0, 20.0),), 40.0: (Brake(0, 0.0),)},
+        {
+            0.0: (Go(0), Accelerate(0, 0.5)), 12.0: (Accelerate(0, -1.0),),
+            16.0: (Accelerate(0, 9.0), Advise(0, 12.0)), 34.0: (Accelerate(0, -2.0),),
+            36.0: (Accelerate(0, math.inf), Advise(0, math.inf)),
+        },
+        {10.0: (Accelerate(0, 1.0),), 60.0: (Go(0),)},
     ],
-    ids=["go", "advise", "stand", "revoke, hard braking", "open", "brake", "brake in the junction"],
-)
+    ids=[
+        "go", "advise", "stand", "revoke, hard braking", "open", "brake", "brake in the junction",
+        "accelerate", "accelerate, held",
+    ],
+)  # fmt: skip
 def test_commands_do_the_same(script: dict[float, tuple[Command, ...]]) -> None:
     ours, theirs = both(single(), timed(script), record="all")
     position, _ = furthest_apart(ours, theirs)
     assert position < 0.1
     assert theirs.columns.travel_time == pytest.approx(ours.columns.travel_time, abs=0.2)
+
+
+#: Four vehicles in one lane are told to brake hard, to creep, to catch up, and to drive by the law.
+PLATOON: dict[float, tuple[Command, ...]] = {
+    0.0: (Open(0),),
+    12.0: (Accelerate(0, -3.0), Accelerate(2, 9.0)),
+    15.0: (Accelerate(0, 0.0), Accelerate(1, 0.5)),
+    20.0: (Accelerate(0, 2.0), Accelerate(3, -1.0)),
+    25.0: (Accelerate(0, math.inf), Accelerate(1, -9.0)),
+    28.0: (Accelerate(1, 9.0), Accelerate(3, 9.0)),
+    36.0: (Accelerate(2, -2.0),),
+    40.0: tuple(Accelerate(vehicle, math.inf) for vehicle in (1, 2, 3)),
+}
+
+
+#: One crawls through the junction and on its exit; one behind is told to accelerate at any rate.
+CRAWL: dict[float, tuple[Command, ...]] = {
+    0.0: (Open(0), Accelerate(1, 9.0)), 25.0: (Advise(0, 2.0),),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("model", ["idm", "krauss"])
+def test_one_that_is_told_keeps_behind_one_that_has_left(model: str) -> None:
+    profile = replace(FAIR, vehicle=VehicleType(model=model))
+    scenario = replayed(four_way(100, profile=profile), (0.0, 0, 2), (4.0, 0, 2), horizon=140.0)
+    ours, theirs = both(scenario, timed(CRAWL), record="all")
+    assert max(furthest_apart(ours, theirs, k)[0] for k in range(2)) < 0.3
+    assert hardest_braking(theirs) < 6.0
+
+
+@pytest.mark.parametrize(("model", "tolerance"), [("idm", 0.02), ("krauss", 0.5)])
+def test_a_platoon_obeys_alike(model: str, tolerance: float) -> None:
+    """To 2 cm, or half a metre where SUMO's own Krauss follows one that brakes hard."""
+    profile = replace(FAIR, vehicle=VehicleType(model=model))
+    trips = (0.0, 0, 2), (3.0, 0, 2), (6.0, 0, 1), (9.0, 0, 2)
+    scenario = replayed(four_way(100, profile=profile), *trips, horizon=120.0)
+    ours, theirs = both(scenario, timed(PLATOON), record="all")
+    assert max(furthest_apart(ours, theirs, k)[0] for k in range(4)) < tolerance
+    assert theirs.columns.travel_time == pytest.approx(ours.columns.travel_time, abs=0.1)
+    assert hardest_braking(theirs) == pytest.approx(profile.vehicle.max_deceleration)
+
+
+def brake(vehicle: int, acceleration: float) -> Brake:
+    return Brake(vehicle, max(-acceleration, 0.0))
+
+
+@pytest.mark.parametrize("press", [Accelerate, brake])
+@pytest.mark.parametrize("model", ["IDM", "Krauss"])
+def test_no_sequence_of_commands_is_beyond_a_vehicle_or_makes_two_touch(
+    model: str, press: Callable[[int, float], Command]
+) -> None:
+    """Vehicles brake three times as hard as Krauss expects of those ahead of them."""
+    vehicle = VehicleType(acceleration=4.0, deceleration=3.0, headway=0.5, min_gap=1.0)
+    scenario = small_scenario(
+        4, density=1200.0, demand_time=30.0, drain=40.0, dt=0.5, vehicle=vehicle
+    )
+    run = simulate(scenario, Pedals(Dim(), 1, 0.3, press), 1, model=model, record="all")
+    assert hardest_braking(run) <= vehicle.max_deceleration + 1e-6
+    assert run.trace["a"].max() <= vehicle.acceleration + 1e-6
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from baselines import V2IC, Reservation
+from baselines import V2IC, Reservation, Slots
 from minisim.channel import Channel
 from minisim.control import Controller
 from minisim.link import Linked
@@ -19,7 +19,10 @@ CHANNELS = [
 ]
 
 
-@pytest.mark.parametrize("controller", [V2IC(), Reservation()], ids=lambda it: it.name)
+CONTROLLERS = [V2IC(), Reservation(), pytest.param(Slots(), marks=pytest.mark.slow)]
+
+
+@pytest.mark.parametrize("controller", CONTROLLERS, ids=lambda it: it.name)
 @pytest.mark.parametrize("channel", CHANNELS, ids=str)
 def test_none_collides_and_all_are_served(controller: Controller, channel: Channel) -> None:
     scenario = small_scenario(4, density=350.0, demand_time=60.0, drain=400.0)

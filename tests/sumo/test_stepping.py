@@ -13,7 +13,19 @@ import pytest
 from dim import Dim, Mixed, NoisyPerception
 from minisim import simulation as ours
 from minisim.channel import Channel
-from minisim.control import Advise, Brake, Controller, External, Go, Open, Plan, Unregulated, Wake
+from minisim.control import (
+    Accelerate,
+    Advise,
+    Brake,
+    Command,
+    Controller,
+    External,
+    Go,
+    Open,
+    Plan,
+    Unregulated,
+    Wake,
+)
 from minisim.errors import CollisionError, ControllerError, SumoError
 from minisim.link import Linked
 from minisim.sumo import Simulation, simulate
@@ -25,6 +37,7 @@ from tests.sumo.test_cc import hosted
 
 LONE = replayed(four_way(profile=FAIR), (0.0, 0, 2), horizon=120.0)
 CROSSING = replayed(four_way(profile=FAIR), (0.0, 0, 2), (0.0, 1, 2), horizon=60.0)
+CRUISING = hosted(replayed(four_way(profile="as_run"), (0.0, 0, 2), horizon=60.0))
 NOISY = NoisyPerception(intent_error=0.15, kind="symmetric")
 
 linux = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="only Linux can fork SUMO")
@@ -49,17 +62,25 @@ def test_dim_from_outside_gives_the_trips_of_dim() -> None:
 
 @pytest.mark.parametrize("host", [ours.Simulation, Simulation])
 @pytest.mark.parametrize(
-    "scenario", [LONE, hosted(replayed(four_way(profile="as_run"), (0.0, 0, 2), horizon=60.0))],
-    ids=["law", "cruise"],
-)  # fmt: skip
-def test_a_command_acts_from_its_time_on(host: type[Simulation], scenario: Scenario) -> None:
-    """Braking set at t changes the speed at t + dt: no step is lost, in either host."""
+    ("scenario", "command", "a"),
+    [
+        (LONE, Brake(0, 3.0), -3.0),
+        (LONE, Accelerate(0, -2.0), -2.0),
+        (CRUISING, Brake(0, 3.0), -3.0),
+        (CRUISING, Accelerate(0, -2.0), -2.0 * 0.01 / (0.5 + 0.01)),  # its engine lags by 0.5 s
+    ],
+    ids=["law, brake", "law, accelerate", "cruise, brake", "cruise, accelerate"],
+)
+def test_a_command_acts_from_its_time_on(
+    host: type[Simulation], scenario: Scenario, command: Command, a: float
+) -> None:
+    """What is set at t changes the speed at t + dt: no step is lost, in either host."""
     with host(scenario, Unregulated(), record="all") as sim:
         sim.advance(20.0)
-        sim.command(Brake(0, 3.0))
+        sim.command(command)
         trace = sim.run().trace
     before, after = (trace["v"][trace["tick"] == round(20.0 / sim.site.dt) + k] for k in (0, 1))
-    assert (after - before) / sim.site.dt == pytest.approx(-3.0, abs=1e-6)
+    assert (after - before) / sim.site.dt == pytest.approx(a, abs=1e-4)
 
 
 def test_outside_and_inside_are_the_same() -> None:
@@ -255,6 +276,6 @@ def test_a_session_that_fails_is_told_as_elsewhere() -> None:
 @linux
 def test_the_example_in_the_docs_runs(capsys: pytest.CaptureFixture[str]) -> None:
     made: dict[str, object] = {}
-    for block in blocks("docs/stepping.md")[:2]:
-        exec(compile(block, "docs/stepping.md", "exec"), made)
+    for block in blocks("docs/howto/stepping.md", "python")[:2]:
+        exec(compile(block, "docs/howto/stepping.md", "exec"), made)
     assert int(capsys.readouterr().out) > 0

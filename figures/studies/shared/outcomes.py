@@ -19,7 +19,7 @@ KIND_LOOKS = {
 #: Panel title -> column, and what its axis counts.
 OUTCOMES = {
     "Collisions": ("collisions", f"in {CROSSINGS:,} crossings"),
-    "False grants": ("false_grants", ""),
+    "False grants": ("false_grants", f"in {CROSSINGS:,} crossings"),
     "Mean delay": (TOTAL_DELAY, "of all vehicles [s]"),
 }
 #: Small print.

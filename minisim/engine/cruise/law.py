@@ -173,6 +173,13 @@ def allowed(
     return v0
 
 
+@njit_inner
+def obey(told: float, v: float, advice: float, law: Law, cruise: Cruise) -> float:
+    """What a vehicle asks of its engine if a command sets its acceleration."""
+    asked = min(told, (cruise.max_speed - v) / law.dt, max((advice - v) / law.dt, -cruise.b))
+    return asked if v > 0.0 else max(asked, 0.0)
+
+
 @njit_inline
 def realise(v: float, a: float, u: float, law: Law, cruise: Cruise) -> float:
     """Acceleration of this step: the engine's answer to `u`, never taking the speed below zero."""

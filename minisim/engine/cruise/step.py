@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from minisim.carfollowing import STANDSTILL, braking_distance, cruise_control
-from minisim.engine.cruise.law import FASTEST, Cruise, allowed, follow, realise
+from minisim.engine.cruise.law import FASTEST, Cruise, allowed, follow, obey, realise
 from minisim.engine.cruise.radar import Ahead, gather, meet
 from minisim.engine.state import AMBER, DRIVING, Layout, Records
 from minisim.jit import njit_inner
@@ -49,6 +49,10 @@ def accelerate(vehicles: Records, lanes: Records, layout: Layout, law: Law, crui
                 u = free(me, layout, law, cruise)
             else:
                 u = cruise_control(v, v0, cruise.cruise_gain, cruise.a, cruise.b)
+            if me["told"] < math.inf and law.model == KRAUSS:
+                u = min(u, me["told"] if v > 0.0 else max(me["told"], 0.0))
+            elif me["told"] < math.inf:
+                u = obey(me["told"], v, me["advice"], law, cruise)
             if cruise.obeys:
                 u = min(u, (allowed(s, v, p, v0, layout, law, cruise) - v) / law.dt)
             nearest = own = tail = math.inf

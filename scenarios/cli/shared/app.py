@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from typing import Annotated
 
 import typer
@@ -29,6 +28,7 @@ def _version(wanted: bool) -> None:
 #: These commands simulate in any case.
 _SIMULATING = (
     "animate", "benchmark", "crossval", "demo", "lab", "optimum", "reproduce", "run", "sweep",
+    "train",
 )  # fmt: skip
 
 
@@ -39,5 +39,6 @@ def _root(
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
     ] = False,
 ) -> None:
-    if context.invoked_subcommand in _SIMULATING and not {"-h", "--help"} & set(sys.argv):
+    given = context.obj or ()  # from `scenarios.cli.main`
+    if context.invoked_subcommand in _SIMULATING and not {"-h", "--help"} & {*given}:
         announce_if_new()

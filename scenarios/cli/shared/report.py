@@ -12,8 +12,9 @@ from rich.text import Text
 from minisim.clock import time_of_day
 from minisim.errors import plural
 from minisim.junction.movements import ARM_NAMES
+from minisim.results.asked import asked_metrics
 from minisim.results.metric import GROUPS, SPREAD, Metric
-from minisim.results.metrics import METRICS, asked_metrics, heading
+from minisim.results.metrics import METRICS, heading
 from minisim.results.show import conditions, spilled
 from scenarios.statistics import FILLING, Interval
 from scenarios.sweep.cells import SUMS
@@ -118,13 +119,15 @@ def optimum_parts(
     what: str, least: Optimum, rows: Iterable[Mapping[str, Any]]
 ) -> Iterator[Text | Table]:
     """The bound, the schedule, and how far each controller is above."""
+    from scenarios.optimum import above
+
     yield Text.assemble((what, "bold"), f": {least.vehicles} vehicles, mean delay")
     table = Table(box=box.SIMPLE_HEAD)
     for title in ("", "delay [s]", "above the bound [%]"):
         table.add_column(title, justify="right" if title else "left")
     planned = {"controller": "schedule, as planned", "delay_s": least.planned}
     table.add_row("bound", f"{least.bound:.3f}", "", style="bold")
-    table.add_row(*_above(planned | {"above_percent": least.above(least.planned)}))
+    table.add_row(*_above(planned | {"above_percent": above(least.planned, least.bound)}))
     for k, row in enumerate(rows):
         schedule = {"controller": "schedule, as driven"} if k == 0 else {}
         table.add_row(*_above({**row, **schedule}), end_section=k == 0)

@@ -12,8 +12,9 @@ import pytest
 
 import minisim
 from baselines import Reservation
+from baselines.manager import Slot
 from baselines.prediction import Leader, courses, law_of, predict
-from baselines.reservation import ReservationSession, Slot
+from baselines.reservation import ReservationSession
 from minisim.control import (
     Command,
     Go,

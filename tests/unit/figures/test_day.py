@@ -24,6 +24,7 @@ def test_a_day_has_a_line_per_controller_at_the_middle_of_each_interval() -> Non
     assert looks[0] == (style.look("dim").colour, style.look("dim").dashes)
     assert looks[1][0] == looks[2][0]
     assert looks[1][1] != looks[2][1]
+    assert [line.get_marker() for line in waiting.lines[1:]] == ["X", "$3$"]
     assert waiting.lines[1].get_xdata().tolist() == [7.125, 7.375]
     expected = service(runs["all-way-stop"])["control_delay_s"].tolist()
     assert delay.lines[1].get_ydata().tolist() == expected

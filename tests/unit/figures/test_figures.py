@@ -20,21 +20,25 @@ from PIL import Image
 import minisim
 from baselines import FixedTime
 from dim import Dim, HarmonyMatrix, explain
-from figures import animation, decision, performance_figure, style, write_animation
+from figures import animation, crossval, decision, performance_figure, style, write_animation
 from figures.film.animate import Picture, frame_times
 from figures.film.encode import COLOURS, palette_of, write_gif
 from figures.film.frames import RELEASED, Frames
 from figures.junction import drawing
+from figures.studies import humans, perception
+from figures.studies.shared import outcomes
 from figures.whole import filmed, head_spans
 from minisim.control import Plan, Unregulated
 from minisim.errors import InputError
 from minisim.fleet import TYPES
 from minisim.junction.conflicts import corridor
 from minisim.junction.geometry import Intersection
+from minisim.results.queues import QUEUE_END
 from minisim.results.run import Run
 from minisim.vehicle import VehicleType
 from scenarios import Scenario, five_way, four_way
 from scenarios.controllers import VARIANTS
+from scenarios.optimum import Clairvoyant
 from scenarios.profiles import FAIR
 from tests.builders import Fixed, replayed
 from tests.colours import EYES, apart, rgb
@@ -117,7 +121,8 @@ def test_film_counts_what_the_trajectories_say(run: Run, film: Frames) -> None:
     for time in (100.1, 112.0, 129.9):
         now = frame[np.isclose(frame["time_s"], time)]
         assert film.at(time).stop - film.at(time).start == len(now)
-        assert film.waiting(film.rows(film.at(time), 1e9)) == (now["speed_mps"] <= 0.1).sum()
+        still, slow = ((now["speed_mps"] <= limit).sum() for limit in (0.1, QUEUE_END))
+        assert still <= film.waiting(film.rows(film.at(time), 1e9)) <= slow
     assert film.served(100.0) == 0
     paths = run.site.intersection.paths
     cleared = 0
@@ -259,10 +264,25 @@ def test_picture_shows_the_vehicles(run: Run, picture: Picture) -> None:
     assert seen == {style.RIGHT_OF_WAY, style.WAITING}
 
 
-def test_no_two_controllers_look_the_same() -> None:
-    looks = [variant.look for variant in VARIANTS.values() if variant.look is not None]
-    looks += [look for name, look in style.ARMS.items() if name != "dim-4"]  # that is DIM
-    assert len({(look.colour, look.marker) for look in looks}) == len(looks)
+def test_any_two_controllers_are_told_apart() -> None:
+    """By marker, and either by colour, to all eyes, or by dashes."""
+    assert Clairvoyant.name in style.SERIES
+    looks = [style.look(name) for name in (*VARIANTS, Clairvoyant.name, "of one's own")]
+    for one, other in combinations(looks, 2):
+        assert one.marker != other.marker
+        if one.dashes == other.dashes:
+            assert min(apart(one.colour, other.colour, eyes) for eyes in EYES) >= 20.0, (one, other)
+
+
+def test_any_two_series_of_a_figure_are_told_apart() -> None:
+    """Those that are no controllers: by colour, to all eyes, or by marker and dashes."""
+    kinds = (style.ARMS, perception.LOOKS, outcomes.KIND_LOOKS, humans.LOOKS)
+    sources = (crossval.MINISIM, crossval.SUMO, crossval.PUBLISHED)
+    for looks in (*(tuple(it.values()) for it in kinds), sources):
+        for one, other in combinations(map(style.coloured, looks), 2):
+            if one.marker == other.marker or one.dashes == other.dashes:
+                near = min(apart(one.colour, other.colour, eyes) for eyes in EYES)
+                assert near >= 20.0, (one, other)
 
 
 def test_every_zone_is_coloured(picture: Picture) -> None:
@@ -457,7 +477,7 @@ def test_performance_figure_draws_means_and_intervals() -> None:
     for axes, column in ((waiting, "waiting_time_s"), (travel, "travel_time_s")):
         assert axes.get_title(loc="left") == f"{column.split('_')[0].capitalize()} time"
         handles, labels = axes.get_legend_handles_labels()
-        assert labels == ["DIM, paper's gate", "fixed-time signal"]
+        assert labels == ["DIM", "fixed-time signal"]
         for handle, controller in zip(handles, ("dim", "fixed-time"), strict=True):
             line, caps, _ = handle.lines
             chosen = points[points["controller"] == controller]

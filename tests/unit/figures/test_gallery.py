@@ -6,8 +6,9 @@ import csv
 import io
 import re
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from itertools import combinations
+from collections.abc import Callable, Iterator
+from functools import cache
+from itertools import chain, combinations
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -25,11 +26,10 @@ from figures.junction.schematic import harmony_table, webster_table
 from figures.tables import WRITERS, Table, save_table
 from minisim.errors import InputError
 from scenarios import studies
-from scenarios.controllers import RIVALS
+from scenarios.controllers import BARE, FAMILIES, RIVALS
 from scenarios.paper import SERIES, Cell
 from scenarios.recipe import Recipe
 from scenarios.studies import NAMES, study_named
-from scenarios.studies.fairness import PRIORITIES
 from scenarios.studies.shared.archive import Archive, MissingRunsError, missing_note
 from scenarios.studies.shared.effort import Effort, Search
 from scenarios.studies.shared.reproduction import Made
@@ -77,6 +77,7 @@ def having(wanted: Callable[[Recipe], bool], effort: Effort = EFFORT, **columns:
 PARTIAL, EMPTY = having(lambda e: e.label != "adaptive"), having(lambda _: False)
 
 
+@cache
 def drawn(name: str, archive: Archive) -> Any:
     return GALLERY[name].build(archive)
 
@@ -87,7 +88,7 @@ def texts_of(figure: Figure) -> list[str]:
 
 @pytest.mark.parametrize("name", GALLERY)
 def test_everything_can_be_made_and_nothing_is_cut_off(name: str, archive: Archive) -> None:
-    drawing = GALLERY[name].build(archive)
+    drawing = drawn(name, archive)
     if isinstance(drawing, Table):
         assert drawing.rows
         return
@@ -97,8 +98,9 @@ def test_everything_can_be_made_and_nothing_is_cut_off(name: str, archive: Archi
         if text.get_text() and text.get_visible() and box.width:
             assert -1 <= box.x0 <= box.x1 <= drawing.bbox.x1 + 1, text
             assert box.y1 <= drawing.bbox.y1 + 1, text
-    legends = [legend.get_window_extent() for legend in drawing.legends]
-    assert not any(one.overlaps(other) for one, other in combinations(legends, 2))
+    texts = (text for text in drawing.texts if text.get_text())
+    above = [item.get_window_extent() for item in (*texts, *drawing.legends)]
+    assert not any(one.overlaps(other) for one, other in combinations(above, 2))
 
 
 def test_every_study_is_drawn_and_every_need_is_a_study() -> None:
@@ -164,7 +166,7 @@ def test_small_print_counts_the_runs_that_there_are() -> None:
     """Seed 2 of the all-way stop is missing, and V2I-C of the published runs has three seeds."""
     some = having(lambda e: (e.label, e.seed) != ("all-way-stop", 2))
     (note,) = [t for t in texts_of(drawn("fair", some)) if "s each" in t]
-    assert note.startswith("180 of 192 runs (2 seeds per case), 3600 s each. Fewer runs: all-way")
+    assert note.startswith("348 of 360 runs (2 seeds per case), 3600 s each. Fewer runs: all-way")
     assert "all-way-stop (fair, 4 arms, balanced, 150) has 1; and 9 more." in note
     assert "no run" not in note
     archive = Archive(synthetic_find, Effort(seeds=5))
@@ -202,19 +204,26 @@ def test_our_means_are_drawn_where_they_are(archive: Archive) -> None:
     figure = drawn("fair", archive)
     (results,) = archive.need("fair")
     handles = figure.axes[0].get_legend_handles_labels()[0]
-    for handle, series in zip(handles, RIVALS, strict=True):
+    for handle, series in zip(handles, FAMILIES[BARE], strict=True):
         rows = results.good[results.good["series"] == series]
         means = rows.groupby("density")["complete_waiting_time_s"].mean()
         np.testing.assert_allclose(np.asarray(handle.lines[0].get_ydata(), float), means)
-    grown = sum(saturated(cell) for _, cell in results.good.groupby(["series", "density"]))
+    shown = results.good[results.good["series"].isin(FAMILIES[BARE])]
+    grown = sum(saturated(cell) for _, cell in shown.groupby(["series", "density"]))
     arrows = [t for t in figure.axes[0].texts if getattr(t, "arrow_patch", None) is not None]
     assert len(arrows) == grown > 0, "where queues grow"
 
 
-@pytest.mark.parametrize("series", [RIVALS, PRIORITIES, ("dim-3", "dim-4", "dim-5")])
-def test_series_are_told_apart_without_colour(series: Sequence[str]) -> None:
-    _, colours, markers, _ = zip(*map(style.look, series), strict=True)
-    assert len(set(colours)) == len(set(markers)) == len(series)
+def test_every_rival_is_named_once_and_pale_in_the_rows_of_other_families(archive: Archive) -> None:
+    figure = drawn("fair", archive)
+    named = [[text.get_text() for text in legend.get_texts()] for legend in figure.legends]
+    for axes, names, legend in zip(figure.axes[::3], FAMILIES.values(), named[:-1], strict=True):
+        shown = [style.look(name).label for name in dict.fromkeys(("dim", *names))]
+        assert axes.get_legend_handles_labels()[1] == shown
+        assert legend == [*shown, "the others"]
+        pale = [line for line in axes.lines if line.get_color() == plots.OTHERS.colour]
+        assert len(pale) == len(RIVALS) - len(shown)
+    assert sorted(chain(*FAMILIES.values())) == sorted(RIVALS)
 
 
 def test_log_axis_shows_plain_numbers() -> None:
@@ -291,7 +300,7 @@ def test_report_names_everything(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     count = report.write_report(PARTIAL, made, 2, tmp_path, lambda k, total: done.append(k))
     assert count == len(FEW) == len(done)
     text = (tmp_path / "report.md").read_text(encoding="utf-8")
-    assert "![clear against harmonious gate](figures/gate.png)" in text
+    assert "![the gates of DIM](figures/gate.png)" in text
     assert (pictures / "gate.png").is_file()
     assert (pictures / "webster.tex").is_file()
     assert "| text |" in text
@@ -315,7 +324,7 @@ def test_a_report_has_nothing_of_others(
     text = (tmp_path / "report.md").read_text(encoding="utf-8")
     headings = [line.removeprefix("## ") for line in text.splitlines() if line.startswith("## ")]
     assert headings == [
-        "What was run", "How far does the harmonious gate move it?",
+        "What was run", "How far do other gates move it?",
         "Collisions", "Over-saturated cells", "Failed runs",
     ]  # fmt: skip
     assert "| controller | gate |" in text

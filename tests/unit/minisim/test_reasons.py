@@ -2,12 +2,24 @@
 
 from __future__ import annotations
 
+import math
 import re
 from pathlib import Path
 
 import pytest
 
-from minisim.control import Advise, Close, Go, Hold, Observed, Open, Plan, Unregulated, View
+from minisim.control import (
+    Accelerate,
+    Advise,
+    Close,
+    Go,
+    Hold,
+    Observed,
+    Open,
+    Plan,
+    Unregulated,
+    View,
+)
 from minisim.reasons import KINDS, Reason, Shown, Witness
 from scenarios import four_way
 from tests.builders import ROOT, car, view
@@ -32,7 +44,7 @@ def kinds(it: Witness) -> list[tuple[int, str, tuple[int, ...]]]:
 
 
 def example(kind: str) -> Reason:
-    """Of vehicle 7, as `docs/reasons.md` shows it."""
+    """Of vehicle 7, as `docs/howto/reasons.md` shows it."""
     return Reason(kind, 7, (3, 5), ("a1", "c1"), 12.0, 20.0, "…")
 
 
@@ -96,6 +108,11 @@ def test_commands_tell_which_vehicles_hold_the_right_of_way() -> None:
     it.look(view(inside, b, behind, time=3.0))
     assert kinds(it) == [(0, "crossing", ()), (1, "advised", ()), (2, "behind", (1,))]
     it.told.clear()
+    it.note([Advise(1, math.inf), Accelerate(1, -1.0)])
+    it.look(view(inside, b, behind, time=3.5))
+    assert kinds(it) == [(1, "told", ())]
+    assert it.told[0].reason.sentence == "Vehicle 1 is told to accelerate at -1.0 m/s²."
+    it.told.clear()
     it.look(view(behind, time=4.0))
     assert kinds(it) == [(2, "held", ()), (0, "left", ()), (1, "left", ())]
 
@@ -131,7 +148,7 @@ def test_heads_are_written_down_when_they_change_and_tell_since_when() -> None:
 
 
 def test_the_page_has_all_kinds() -> None:
-    page = Path(ROOT / "docs" / "reasons.md").read_text()
+    page = Path(ROOT / "docs" / "howto" / "reasons.md").read_text()
     rows = re.findall(r"^\| ([a-z ]+) \| (.+) \|$", page, re.MULTILINE)
     table = {kind: said for kind, said in rows if kind != "kind"}
     assert table == {kind: example(kind).sentence for kind in KINDS}

@@ -13,6 +13,7 @@ import minisim
 from dim import Dim
 from minisim.control import (
     LATERAL_ACCELERATION,
+    Accelerate,
     Advise,
     Brake,
     Close,
@@ -358,7 +359,8 @@ def test_bad_arguments_are_named(arguments: dict[str, object], message: str) -> 
     "command",
     [
         Go(99), Hold(-1), Go("x"), Open(4), Close(-1), Advise(0, -1.0), Brake(0, -1.0),
-        Brake(9, 1.0), Brake(0, math.inf), Wake(0.0), "go", None,
+        Brake(9, 1.0), Brake(0, math.inf), Accelerate(9, 1.0), Accelerate(0, math.nan),
+        Accelerate(0, -math.inf), Wake(0.0), "go", None,
     ],
     ids=repr,
 )  # fmt: skip

@@ -33,8 +33,9 @@ def test_names_are_spellings(name: str) -> None:
 
 def test_the_paper_s_four_come_first_among_the_rivals() -> None:
     assert RIVALS == (
-        "dim", "dim:gate=harmonious", "fixed-time", "adaptive", "v2ic", "all-way-stop",
-        "reservation", "max-pressure",
+        "dim", "dim:gate=harmonious", "dim:gate=passed", "fixed-time", "fixed-time:facing=true",
+        "adaptive", "v2ic", "all-way-stop", "reservation", "max-pressure",
+        "max-pressure:facing=true", "slots", "slots:batch=1", "platoons", "platoons:service=gated",
     )  # fmt: skip
     assert set(RIVALS) < set(safe()) < set(VARIANTS)
     assert not any("as-run" in name or name == "unregulated" for name in safe())

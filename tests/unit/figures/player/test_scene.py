@@ -22,6 +22,7 @@ from figures.player import vlq
 from figures.player.scene import KEYS, dumped
 from minisim.control import HALTING, Unregulated
 from minisim.errors import FileError, InputError
+from minisim.results.queues import QUEUE_END
 from minisim.results.run import Run
 from scenarios import four_way
 from scenarios.profiles import FAIR
@@ -58,14 +59,15 @@ def test_positions_and_states_are_those_of_the_run(run: Run, made: dict[str, Any
     for track in made["tracks"]:
         exit_s = made["ways"][track["way"]]["exit"] + made["types"][track["type"]]["length"]
         states = dict(zip(track["states"][::2], track["states"][1::2], strict=True))
-        state = None
+        state, queued = None, False
         for k, s in enumerate(positions(track["s"]), start=track["from"]):
             row = rows[track["id"], 600 + k]
             state = states.get(k, state)
             assert abs(row.s_m - s) <= 0.00501
             later = rows.get((track["id"], 601 + k), row)  # a row has what held before it
             goes = bool(later.right_of_way) and row.s_m <= exit_s + 1e-3
-            assert state == 2 * goes + (row.speed_mps <= HALTING)
+            queued = row.speed_mps <= (QUEUE_END if queued else HALTING)
+            assert state == 2 * goes + queued
             seen += 1
     assert seen > 2000
     human = {track["id"] for track in made["tracks"] if track.get("human")}

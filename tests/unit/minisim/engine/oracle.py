@@ -18,6 +18,7 @@ from minisim.laws import (
     drive,
     hold,
     keep_room,
+    obey,
     room_behind,
     short_of,
     slow_down,
@@ -88,6 +89,8 @@ def accelerate(vehicles: Records, lanes: Records, layout: Layout, law: Law) -> b
             section, factor = me["section"], me["factor"]
             limit = speed[p, section] * factor
             acc = drive(v, limit, me["advice"], z, mine, law)
+            if me["told"] < math.inf:
+                acc = obey(me["told"], v, min(limit, me["advice"]), z, mine, law)
             k = section + 1
             while braking_begins(v, start[p, k] - s, mine, law):
                 lower = speed[p, k] * factor

@@ -16,6 +16,7 @@ from minisim.simulation import Simulation
 from minisim.vehicle import VehicleType
 from scenarios import Scenario, five_way, four_way, three_way
 from scenarios.profiles import FAIR
+from tests.builders import Pedals
 from tests.unit.minisim.engine import oracle
 
 QUICK = VehicleType(acceleration=2.0, length=2.0, width=0.8, max_deceleration=8.0, name="quick")
@@ -34,11 +35,11 @@ CASES = {
             three_way(350, arm_length=200.0, lane_width=4.0),
             fleet=Fleet((QUICK, HEAVY), ((0.6,), (0.4,))),
         ),
-        Dim(monitor=Monitor()),
+        Pedals(Dim(monitor=Monitor())),
     ),
     "drivers": (driven_by(speed_deviation=0.2), FixedTime()),
     "iidm": (driven_by(model="iidm"), V2IC()),
-    "krauss": (driven_by(model="krauss"), FixedTime()),
+    "krauss": (driven_by(model="krauss"), Pedals(Dim())),
 }
 
 

@@ -6,12 +6,14 @@ from typing import Any
 
 import pytest
 
+from minisim.channel import Channel
 from minisim.control import (
     Advise,
     Go,
     Hold,
     Observed,
     Plan,
+    Reserve,
 )
 from minisim.link.messages import Order, Status
 from minisim.link.office import Office
@@ -129,4 +131,28 @@ def test_a_view_says_when_each_vehicle_spoke() -> None:
     office = Office(SITE, PLAN)
     heard(office, car(0, "a2", 70.0), at=3, holds=True)
     assert office.view(9).time == pytest.approx(0.9)
-    assert office.view(9).reports == {0: (pytest.approx(0.3), True)}
+    assert office.view(9).reports == {0: (pytest.approx(0.3), True, True)}
+
+
+def test_a_view_says_whether_a_vehicle_follows_what_it_was_told() -> None:
+    office, me = Office(SITE, PLAN), car(0, "a2", 40.0)
+    heard(office, me)
+    office.take(Advise(0, 5.0))
+    assert not office.view(1).reports[0].follows
+    heard(office, me, at=2, number=1)
+    assert office.view(2).reports[0].follows
+
+
+def test_a_promise_is_repeated_as_long_as_it_is_sure_to_come_in_time() -> None:
+    """It takes up to 0.2 s and is due at 1 s, so the last one is sent at 0.8 s."""
+    office = Office(SITE.with_channel(Channel(latency=0.1, jitter=0.1)), PLAN)
+    heard(office, car(0, "a2", 40.0))
+    office.take(Reserve(0, 1.0, lambda *_: True))
+    assert office.talking
+    assert [now for now in range(12) for _ in office.promises(now, 3)] == [0, 3, 6]
+    assert not office.talking
+    office.take(Reserve(0, 2.0, lambda *_: True))
+    office.take(late := Reserve(0, 2.1, lambda *_: True))
+    assert [*office.promises(12, 3)] == [late]
+    heard(office, car(0, "a2", -10.0), left=True)
+    assert [*office.promises(15, 3)] == []

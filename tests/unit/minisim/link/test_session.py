@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import pytest
@@ -13,6 +13,7 @@ from baselines import V2IC, AllWayStop, V2ICAsRun
 from dim import Dim
 from minisim.channel import Channel
 from minisim.control import (
+    Accelerate,
     Command,
     Controller,
     Go,
@@ -28,7 +29,7 @@ from minisim.errors import CollisionError, ControllerError, InputError
 from minisim.link import Link, Linked
 from minisim.testing import small_scenario
 from scenarios import four_way
-from tests.builders import Fixed, Scripted, digest, replayed
+from tests.builders import PEDALS, Fixed, Scripted, digest, replayed
 
 FAIR = four_way(250, profile="fair", horizon=300.0)
 SITE = FAIR.site(1)
@@ -96,13 +97,15 @@ def test_whatever_a_controller_commands_none_collides(channel: Channel) -> None:
     def fickle(view: View) -> Iterable[Command]:
         wanted = (Hold if (it.id + int(view.time)) % 3 else Go for it in view.vehicles)
         commands = (kind(it.id) for kind, it in zip(wanted, view.vehicles, strict=True))
-        return [*commands, Wake(view.time + 1.0)]
+        rates = (PEDALS[(it.id + int(view.time)) % len(PEDALS)] for it in view.vehicles)
+        told = (Accelerate(it.id, a) for it, a in zip(view.vehicles, rates, strict=True))
+        return [*commands, *told, Wake(view.time + 1.0)]
 
     with pytest.raises(CollisionError):
         minisim.simulate(scenario, Scripted(greedy, PLAN))
     run = minisim.simulate(scenario, Forced(Linked(Scripted(greedy, PLAN, radio=Radio()), channel)))
     assert run.columns.arrived.all()
-    minisim.simulate(scenario, Forced(Scripted(fickle, PLAN)))
+    minisim.simulate(replace(scenario, drain=60.0), Forced(Scripted(fickle, PLAN)))
 
 
 def test_published_rules_run_over_a_link_too() -> None:

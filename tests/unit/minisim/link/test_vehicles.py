@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 from minisim.control import (
+    Advise,
+    Go,
+    Hold,
     Observed,
     Plan,
     Reserve,
@@ -36,6 +40,14 @@ def test_a_vehicle_does_what_the_newest_order_says() -> None:
     assert obeyed(vehicles, Order(0, 3, go=True), Order(0, 4)) == ["Advise 0", "Brake 0", "Hold 0"]
     (status,) = vehicles.statuses(7)
     assert status == Status(car(0, "a2", 40.0, 5.0), 7, number=4, holds=False, left=False)
+
+
+def test_an_acceleration_is_told_and_released_by_messages() -> None:
+    vehicles = beside(car(0, "a2", 40.0, 5.0))
+    told = Order(0, 1, acceleration=-1.0)
+    assert obeyed(vehicles, told) == ["Accelerate 0"]
+    assert obeyed(vehicles, told._replace(number=2)) == []
+    assert obeyed(vehicles, Order(0, 3)) == ["Accelerate 0"]
 
 
 def test_one_that_cannot_stop_keeps_its_right_of_way_and_says_so() -> None:
@@ -82,3 +94,14 @@ def test_a_vehicle_off_its_passage_gives_it_up_if_it_can_stop() -> None:
     vehicles.look(view(car(0, "a2", 5.0, 3.0), time=1.1))
     assert said(vehicles.reserve(11)) == ["Hold 0"]
     assert [status.holds for status in vehicles.statuses(11)] == [False]
+
+
+def test_no_order_counts_during_a_passage() -> None:
+    vehicles = beside(car(0, "a2", 40.0, 5.0))
+    obeyed(vehicles, Order(0, 1, speed=3.0))
+    passage = reserving(0.5, lambda _, time: time < 1.0)
+    obeyed(vehicles, passage, now=3)
+    assert list(vehicles.reserve(5)) == [Go(0), Advise(0, math.inf)]
+    assert obeyed(vehicles, passage, Order(0, 2, speed=4.0), now=5) == []
+    assert list(vehicles.reserve(5)) == []
+    assert list(vehicles.reserve(10)) == [Hold(0), Advise(0, 4.0)]

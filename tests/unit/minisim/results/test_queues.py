@@ -8,12 +8,19 @@ import numpy as np
 import pytest
 
 import minisim
-from baselines import FixedTime
+from baselines import AllWayStop, FixedTime
 from dim import Dim
-from minisim.control import Command, Open, Plan, View, Wake
+from minisim.control import HALTING, Command, Open, Plan, View, Wake
 from minisim.errors import InputError
-from minisim.results.queues import queue_lengths, queue_table, saturation_headways
+from minisim.results.queues import (
+    QUEUE_END,
+    queue_lengths,
+    queue_table,
+    queueing,
+    saturation_headways,
+)
 from minisim.results.run import Run
+from minisim.results.tracks import whole_tracks
 from minisim.vehicle import VehicleType
 from scenarios import four_way
 from tests.builders import Scripted, queues, replayed
@@ -129,3 +136,24 @@ def test_a_queue_needs_the_whole_road() -> None:
     for of in (queue_lengths, saturation_headways):
         with pytest.raises(InputError, match="record='all'"):
             of(run)
+
+
+def test_a_vehicle_that_moves_up_stays_in_the_queue() -> None:
+    slow, fast = QUEUE_END - 0.01, QUEUE_END + 0.01
+    one = [9.0, slow, 0.0, 0.2, slow, 0.0, slow, fast, slow, 0.1, fast]
+    other = [slow, 0.05, slow]  # it is new, whatever the one before did
+    first = [k in (0, len(one)) for k in range(len(one + other))]
+    wanted = [0, 0, 1, 1, 1, 1, 1, 0, 0, 1, 0, 0, 1, 1]
+    assert queueing(np.array(one + other), np.array(first)).astype(int).tolist() == wanted
+    assert queueing(np.array([]), np.array([], dtype=bool)).tolist() == []
+
+
+def test_states_hold_still_while_a_queue_creeps() -> None:
+    """Vehicles move up one by one at a stop: few of these moves are fast enough to leave."""
+    run = minisim.simulate(four_way(400, profile="fair", horizon=150), AllWayStop(), record="all")
+    tracks = whole_tracks(run)
+    coming = tracks.s < run.site.intersection.paths[0].entry
+    stood, queued = tracks.v <= HALTING, queueing(tracks.v, tracks.first)
+    assert queued[stood].all()
+    often, seldom = (int(tracks.begins(state & coming).sum()) for state in (stood, queued))
+    assert 0 < seldom < 0.9 * often

@@ -16,7 +16,7 @@ from scenarios.benchmark.definition import (
 from scenarios.controllers import safe
 
 #: Version -> digest. A changed definition is another benchmark: raise its version.
-DIGESTS = {1: "49b37e409dc9dffc"}
+DIGESTS = {1: "49b37e409dc9dffc", 2: "2967f6a664bd5f4e"}
 
 HEAD = 'name = "ours"\nversion = 2\nseeds = [3, 5]\nhorizon = 60\n'
 
@@ -36,15 +36,17 @@ def test_what_its_files_say_belongs_to_the_definition(tmp_path: Path) -> None:
     for file in standard_file().parent.glob("benchmark*.toml"):
         shutil.copy(file, tmp_path)
     peak = tmp_path / "benchmark_peak.toml"
-    assert read_benchmark(tmp_path / "benchmark.toml").digest == DIGESTS[1]
+    assert read_benchmark(tmp_path / "benchmark.toml").digest == DIGESTS[2]
     peak.write_text(peak.read_text().replace("rates = [700, ", "rates = [701, "))
-    assert read_benchmark(tmp_path / "benchmark.toml").digest != DIGESTS[1]
+    assert read_benchmark(tmp_path / "benchmark.toml").digest != DIGESTS[2]
 
 
-def test_cells_are_plain_unless_vehicles_err_or_humans_drive() -> None:
+def test_cells_are_plain_unless_vehicles_err_humans_drive_or_messages_fail() -> None:
     made = read_benchmark()
-    assert len(made.cells) == 12
-    assert {cell.name for cell in made.cells} - {*made.plain} == {"misread signals", "40 % humans"}
+    assert len(made.cells) == 14
+    assert {cell.name for cell in made.cells} - {*made.plain} == {
+        "misread signals", "40 % humans", "messages lost",
+    }  # fmt: skip
     assert {cell.scenario.intersection.n for cell in made.cells} == {3, 4, 5}
 
 
@@ -73,10 +75,17 @@ def test_a_cell_says_how_its_controllers_perceive_and_which_vehicles_humans_driv
         humans.recipe("x", Reservation(), 1)
 
 
+def test_messages_fail_where_a_controller_sends_them() -> None:
+    cell = next(it for it in read_benchmark().cells if it.name == "messages lost")
+    failing, silent = (cell.recipe("x", it, 1) for it in (Reservation(), AllWayStop()))
+    assert (failing.latency, failing.loss, failing.name) == (0.1, 0.3, "x")
+    assert silent.driven == AllWayStop()
+
+
 def test_all_runs_of_a_seed_have_the_same_arrivals() -> None:
     made = read_benchmark(quick=True)
     runs = list(made.runs([("stop", AllWayStop()), ("reservation", Reservation())]))
-    assert len(runs) == 12 * 2 * 3
+    assert len(runs) == 14 * 2 * 3
     assert [name for _, name, _, _ in runs[:3]] == [SCHEDULE, "stop", "reservation"]
     refused = [(cell.name, name) for cell, name, _, it in runs if isinstance(it, InputError)]
     assert refused == [("40 % humans", "reservation")] * 2
@@ -96,6 +105,9 @@ def test_all_runs_of_a_seed_have_the_same_arrivals() -> None:
         (HEAD + 'metrics = ["stops"]\n', "cells have no metrics; leave it out"),
         (HEAD + 'on_collision = "record"\n', "cells have no on_collision"),
         (HEAD + 'controller = "reservation"\n', "a cell is dim, .* got 'reservation'"),
+        (HEAD + 'controller = "v2ic"\n', "v2ic if messages fail, got 'v2ic'"),
+        (HEAD + 'controller = "v2ic:reach=90"\nloss = 0.1\n', "got 'v2ic:reach=90"),
+        (HEAD + "loss = 0.1\n", "a controller that vehicles talk to, such as v2ic; dim sends none"),
         (HEAD + 'controller = "dim:gate=harmonious"\n', "got 'dim:gate=harmonious'"),
         (HEAD + "[quick]\nsedes = 3\n", r"unknown key of \[quick\] 'sedes'.*mean 'seeds'"),
         (HEAD + "sedes = 3\n", "unknown key 'sedes'.*did you mean 'seeds'"),

@@ -91,6 +91,18 @@ def test_help_lists_every_command(capsys: Captured) -> None:
     assert {c.name or c.callback.__name__ for c in app.registered_commands} == set(COMMANDS)
 
 
+@pytest.mark.parametrize("asked", [True, False])
+def test_only_a_command_that_simulates_announces_compiling(
+    asked: bool, capsys: Captured, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What counts is what `main` is given, not how this process was started."""
+    told: list[str] = []
+    monkeypatch.setattr(sys, "argv", ["minisim", "run", *(["--help"] * (not asked))])
+    monkeypatch.setattr("scenarios.cli.shared.app.announce_if_new", lambda: told.append("new"))
+    main(["run", "--help"] if asked else ["run", "nowhere"])
+    assert told == ["new"] * (not asked)
+
+
 def test_run_help_has_examples_that_work(capsys: Captured) -> None:
     lines = [" ".join(line.split()) for line in ok(capsys, "run", "--help").splitlines()]
     examples = [line for line in lines if line.startswith("minisim run ")]
@@ -525,7 +537,7 @@ def test_demo_quick(capsys: Captured, tmp_path: Path) -> None:
     out = ok(capsys, "demo", "--quick", "--out", str(folder), "--jobs", "1")
     names = ["demo.csv", "demo.gif", "demo.md", "demo.png"]
     assert sorted(p.name for p in folder.iterdir()) == names
-    assert "DIM, paper's gate" in out
+    assert "DIM, harmonious gate" in out
     points = pd.read_csv(folder / "demo.csv")
     assert {*points["controller"]} == {"dim", "dim:gate=harmonious", "fixed-time"}
     assert {*points["density"]} == {150.0, 350.0}

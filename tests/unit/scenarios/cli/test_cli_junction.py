@@ -103,6 +103,24 @@ def test_commands_about_rules_take_a_node_and_know_what_is_closed_there(
         assert "node needs a town's network" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("asked", "why"),
+    [
+        (
+            ["four-way", "--gate", "passed"],
+            "for 3 arms with the gate passed; four-way has 4, and too many states: take three-way",
+        ),
+        (["five-way"], "for 3 and 4 arms; five-way has 5, and too many states: take four-way"),
+        (["five-way", "--gate", "past"], "'past'"),
+    ],
+)
+def test_a_protocol_with_too_many_states_is_refused_at_once(
+    asked: list[str], why: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["protocol", *asked]) == 2
+    assert why in capsys.readouterr().err
+
+
 def test_a_hostile_file_is_one_sentence_and_code_2(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -70,7 +70,7 @@ def test_a_row_holds_what_was_counted() -> None:
 
 
 def test_the_collision_that_docs_explain() -> None:
-    """docs/safety.md, "Wrong perception": all but c3 itself take it for c2."""
+    """docs/background/safety.md, "Wrong perception": all but c3 itself take it for c2."""
     scenario = four_way(250, profile="fair")
     with pytest.raises(CollisionError) as caught:
         simulate(scenario, Dim(perception=NoisyPerception(0.15)), 1)
