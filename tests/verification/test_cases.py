@@ -171,7 +171,7 @@ def test_a_wrong_table_is_found(claim: str) -> None:
 
 
 def test_answers_that_depend_on_the_order_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The paper's own way, networkx and the first of the largest: it is not unanimous."""
+    """The first of the largest that are found, as in the paper: it is not unanimous."""
     monkeypatch.setattr("dim.proofs.verification.choose", lambda cliques, *_: max(cliques, key=len))
     analysis = analyse(HarmonyMatrix.paper(4))
     assert [claim.name for claim in analysis.claims if not claim.holds] == ["order"]
