@@ -65,7 +65,7 @@ def begin(arms: int) -> npt.NDArray[np.float64]:
 def train(
     scenario: Scenario,
     *,
-    generations: int = 150,
+    generations: int = 200,
     population: int = 24,
     runs: int = 6,
     seed: int = 0,
