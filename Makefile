@@ -47,10 +47,10 @@ pictures: demo  ## the pictures of README and docs, redrawn from out/runs.sqlite
 	$(BIN)/minisim decide four-way a1 b2 c2 d2 --plot docs/decision.png
 	$(BIN)/minisim benchmark --out out/benchmark
 	cp out/benchmark/figures/cells.png docs/benchmark.png
-	$(BIN)/minisim figures waiting-balanced perception optimum humans messages \
+	$(BIN)/minisim figures waiting-balanced perception optimum gap humans messages \
 	  --store out/runs.sqlite --out out/figures
 	cp out/figures/waiting-balanced.png docs/waiting.png
-	for name in perception optimum humans messages; do cp out/figures/$$name.png docs; done
+	for name in perception optimum gap humans messages; do cp out/figures/$$name.png docs; done
 
 figures: $(VENV)/.installed  ## every figure and table, from out/runs.sqlite (make reproduce) or else a quick run
 	if [ -f out/runs.sqlite ]; then $(BIN)/minisim figures --store out/runs.sqlite --out out/figures; \

@@ -212,13 +212,37 @@ def _edges(participants: Movements, matrix: HarmonyMatrix) -> tuple[tuple[Moveme
 
 
 def maximal_cliques(participants: Movements, matrix: HarmonyMatrix) -> list[Movements]:
-    """All maximal cliques, in no reliable order; each sorted by lane."""
-    import networkx as nx
+    """All maximal cliques, in no reliable order; each sorted by lane.
 
-    graph: nx.Graph[Movement] = nx.Graph()
-    graph.add_nodes_from(participants)
-    graph.add_edges_from(_edges(participants, matrix))
-    return [tuple(sorted(clique)) for clique in nx.find_cliques(graph)]
+    Source: Bron & Kerbosch 1973, Communications of the ACM 16:575, algorithm 457, version 2, but
+    with the first node as the pivot. A set of nodes is an integer: bit k for participant k.
+    """
+    near = [0] * len(participants)
+    for (j, one), (k, other) in combinations(enumerate(participants), 2):
+        if matrix.harmony(one, other):
+            near[j] |= 1 << k
+            near[k] |= 1 << j
+
+    def grown(clique: int, more: int, done: int) -> Iterator[int]:
+        """The cliques with nodes of `more`, which can all be added; with `done` they are known."""
+        if not more | done:
+            yield clique
+            return
+        todo = more & ~near[_first(more | done)]
+        while todo:
+            k = _first(todo)
+            yield from grown(clique | 1 << k, more & near[k], done & near[k])
+            todo, more, done = todo & ~(1 << k), more & ~(1 << k), done | 1 << k
+
+    found = grown(0, (1 << len(participants)) - 1, 0) if participants else ()
+    return [
+        tuple(sorted(m for k, m in enumerate(participants) if clique >> k & 1)) for clique in found
+    ]
+
+
+def _first(nodes: int) -> int:
+    """The lowest bit that is set."""
+    return (nodes & -nodes).bit_length() - 1
 
 
 def _key(clique: Movements, order: str, ranks: tuple[int, ...]) -> tuple[int, list[int]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from figures import plots, style
 from figures.tables import Table
@@ -28,18 +29,13 @@ def learning_figure(training: Training, rows: pd.DataFrame) -> Figure:
     left.plot(number, gained, color=style.FAINT, linewidth=1.0)
     left.plot(number[width - 1 :], smooth, color=style.BLUE, linewidth=2.0)
     left.axhline(0.0, color=style.INK, linewidth=0.8)
+    left.xaxis.set_major_locator(MaxNLocator(integer=True))
     style.plot_axes(left, "Training", "generation", "median less the start policy [s/vehicle]")
-    names = list(dict.fromkeys(rows["controller"]))
-    colours = (style.BLUE, style.SKY, style.VERMILLION, style.ORANGE, style.PURPLE, style.GREEN)
-    looks = dict(zip(names, zip((*colours, style.BLACK), "oshv^DX", strict=True), strict=False))
-    for place, (name, (colour, marker)) in enumerate(looks.items()):
+    for place, name in enumerate(dict.fromkeys(rows["controller"])):
         cells = list(rows[rows["controller"] == name].groupby("density"))
-        found = [mean_interval(cell[DELAY.name]) for _, cell in cells]
         x = [float(str(density)) + 3.0 * (place - 3) for density, _ in cells]
-        right.errorbar(
-            x, [it.mean for it in found], [it.half_width for it in found], color=colour,
-            marker=marker, capsize=2.5, linewidth=1.4, label=name,
-        )  # fmt: skip
+        found = [plots.mean_estimate(cell[DELAY.name]) for _, cell in cells]
+        plots.draw_line(right, x, found, style.look(name))
     once = rows.drop_duplicates(["density", "seed"]).groupby("density")[LEAST.name].mean()
     right.plot(once.index, once, color=style.MUTED, linestyle=":", linewidth=1.6, label="bound")
     right.set_yscale("log")

@@ -62,10 +62,12 @@ ARMS = {
     5: Look("5 arms", "vermillion", "p", "-."), 6: Look("6 arms", "ink", "h", ":"),
 }  # fmt: skip
 
-#: Series that are no controllers of the table: DIM by the number of arms, and the optimum's.
+#: Series that are no controllers of the table: DIM by the number of arms, the optimum's, policies.
 SERIES = {
     **{f"dim-{arms}": look for arms, look in ARMS.items()},
     "schedule": Look("schedule (knows all arrivals)", "grey", ".", "-."),
+    "learnt": Look("learnt", "indigo", "$L$", "-"),
+    "longest wait first": Look("longest wait first", "indigo", "$W$", ":"),
 }
 
 #: Font of an axis label.

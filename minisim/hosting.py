@@ -217,7 +217,7 @@ def begin(
     window = checked_window(record_window)
     if isinstance(scenario, type) or not all(hasattr(scenario, name) for name in NEEDED):
         raise InputError(f"scenario must be a Scenario such as four_way(), got {show(scenario)}")
-    as_controller(show(controller), controller)
+    as_controller(controller)
     site = scenario.site(integer("seed", seed, low=0))
     arrivals = scenario.arrivals(seed)
     arrivals.check(site.intersection.n, site.intersection.allowed_by_lane)

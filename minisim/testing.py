@@ -29,7 +29,6 @@ from minisim.errors import (
     instance,
     integer,
     number,
-    show,
 )
 from minisim.fleet import Fleet
 from minisim.inflow import MAX_DENSITY
@@ -151,7 +150,7 @@ def check_controller(
     instance("arms", arms, Iterable)
     run = _simulate_in(host)
     try:
-        as_controller(show(controller), controller)
+        as_controller(controller)
     except InputError as error:
         raise ContractError(str(error)) from None
     copy = _check_value(controller)

@@ -172,12 +172,12 @@ def controller_named(
     """
     as_run = profile_named(profile).name == AS_RUN.name
     if not isinstance(spec, str | Mapping):
-        return as_controller(show(spec), spec)
+        return as_controller(spec)
     call = read_spec(spec)
     name = call.name
     if as_run and not call.named and name in CONTROLLERS:
         name = CONTROLLERS[name].as_run or name
-    return as_controller(call.name, build(name, maker_of(name), call))
+    return as_controller(build(name, maker_of(name), call), call.name)
 
 
 def label_of(series: str) -> str:
@@ -242,7 +242,7 @@ def maker_of(name: str) -> Any:
         return CONTROLLERS[name].make
     make = _loaded(name) if name in plugins() else load_class(*name.rsplit(":", 1))
     if isinstance(make, type) and not is_maker(make):
-        as_controller(name, make)  # says what it lacks
+        as_controller(make, name)  # says what it lacks
     return make
 
 

@@ -31,7 +31,7 @@ Host = Callable[..., Run]
 def _controller(title: str, value: Any) -> Any:
     """Check `Recipe.controller`; what a text means depends on the profile."""
     named = isinstance(value, str | Mapping)
-    return value if named else as_controller(f"{title} {show(value)}", value)
+    return value if named else as_controller(value, f"{title} {show(value)}")
 
 
 @declared

@@ -345,6 +345,9 @@ CURVES = {
     "fixed-time:facing=true": (2.0, 380.0), "max-pressure:facing=true": (2.0, 440.0),
     "slots": (0.2, 580.0), "slots:batch=1": (0.3, 560.0),
     "platoons": (0.2, 620.0), "platoons:service=gated": (0.2, 600.0),
+    "unregulated": (0.1, 900.0), "dim without conflicts": (0.3, 800.0),
+    "dim:gate=passed,priorities=waiting": (0.4, 560.0),
+    "dim:gate=harmonious,priorities=waiting": (0.4, 530.0),
 }  # fmt: skip
 
 
@@ -391,7 +394,7 @@ def synthetic_row(experiment: Recipe) -> dict[str, Any]:
         **identity_of(experiment), "trips": trips, "unfinished": 9, "collisions": 0, **times,
         **{f"complete_{key}": value for key, value in times.items()},
         **lanes, **tally(experiment, trips), "queue_growth": excess, "growing": excess > 0.0,
-        "least_delay_s": 2.0, "above_least_percent": 50.0 * waiting,
+        "least_delay_s": 2.0, "delay_s": 2.0 + waiting, "above_least_percent": 50.0 * waiting,
         "arrivals": "same", "cpu_s": 0.1, "version": "test", "error": None,
     }  # fmt: skip
 

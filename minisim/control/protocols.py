@@ -10,7 +10,7 @@ from minisim.control.commands import Command
 from minisim.control.plan import Plan
 from minisim.control.site import Site
 from minisim.control.view import View
-from minisim.errors import InputError, printable, told
+from minisim.errors import InputError, printable, show, told
 
 _P = TypeVar("_P")
 
@@ -82,18 +82,20 @@ class Controller(Protocol):
         """Begin a run. Raises `InputError` for a site that it cannot serve."""
 
 
-def as_controller(what: str, value: object) -> Controller:
-    """Return `value` if it is a controller; `what` names it in the `InputError` if not."""
+def as_controller(value: object, what: str = "") -> Controller:
+    """Return `value` if it is a controller; an `InputError` calls it `what`, or shows it."""
     try:
         if keeps(value, Controller) and not isinstance(value, type):
-            printable(f"the name of {what}", value.name)
+            name = value.name
+            if not (type(name) is str and name and name.isprintable()):  # to show it takes long
+                printable(f"the name of {what or show(value)}", name)
             return value
     except InputError:
         raise
     except (Exception, SystemExit) as error:  # a caller's code may raise anything
-        raise InputError(f"{what} has no name: {told(error)}") from error
+        raise InputError(f"{what or show(value)} has no name: {told(error)}") from error
     lacks = [part for part in ("name", "start") if not hasattr(value, part)]
     why = f"it has no {' and no '.join(lacks)}" if lacks else "it is a class"
     named = isinstance(value, str | Mapping)
     hint = "; make it with scenarios.controllers.controller_named" if named else ""
-    raise InputError(f"{what} is not a controller: {why}{hint}")
+    raise InputError(f"{what or show(value)} is not a controller: {why}{hint}")

@@ -45,7 +45,7 @@ def radio_of(controller: object) -> Radio | None:
 def _talking(title: str, value: Controller) -> Controller:
     if isinstance(value, Linked):
         raise InputError(f"the messages of {value.name} fail already")
-    if radio_of(as_controller(f"{title} {show(value)}", value)) is None:
+    if radio_of(as_controller(value, f"{title} {show(value)}")) is None:
         raise InputError(
             f"messages can fail only with a controller that vehicles talk to, such as v2ic; "
             f"{name_of(value)} sends none"

@@ -22,7 +22,7 @@ from scenarios.studies import NAMES, study_named
     "the store is not repeated, so an interrupted command continues where it stopped.\n\n"
     "[bold]How long[/bold]\n\n"
     "In minutes of processor time, with 10 seeds and 0.1 s for an hour under DIM: text (the "
-    "paper's grid, 700 hours, comes first) 2.5; fair 11; optimum 15; gate and fairness 1.5; "
+    "paper's grid, 700 hours, comes first) 2.5; fair 11; optimum 15; gap 4; gate and fairness 1.5; "
     "perception 26 and confidence 3 (at most 5 seeds); messages 11; capacity 19; as-run (step "
     "0.01 s) 25. Two processes halve the time. For the paper's grid alone: "
     "[bold]minisim reproduce --only text[/bold].\n\n"

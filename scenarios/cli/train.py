@@ -41,6 +41,7 @@ def train(
     from scenarios.environments.evaluation import compared
     from scenarios.environments.training import train as trained
     from scenarios.library import four_way
+    from scenarios.optimum import DELAY
 
     workers = options.processes(jobs)
     folder = make_folder(out)
@@ -51,6 +52,11 @@ def train(
     with bar("comparing") as progress:
         rows = compared(done.weights, seeds=runs, jobs=workers, progress=progress)
     write_table(rows, folder / "learnt.csv")
-    save(learning_figure(done, rows), folder / "learnt.png")
-    typer.echo(learning_table(rows).markdown())
+    good = rows[rows[DELAY.name].notna()]
+    if len(good) < len(rows):
+        why = next(iter(rows["error"].dropna()), "no reason is known")
+        failed = f"{len(rows) - len(good)} of {len(rows)} runs failed"
+        typer.echo(f"minisim: {failed}, and are left out: {why}", err=True)
+    save(learning_figure(done, good), folder / "learnt.png")
+    typer.echo(learning_table(good).markdown())
     typer.echo(f"  wrote learnt.json, learnt.csv and learnt.png to {folder}")

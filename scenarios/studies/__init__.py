@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
 #: Every study, in the order of runs and of the report.
 NAMES = (
-    "text", "as-run", "fair", "optimum", "gate", "mixed", "capacity", "fairness", "humans",
-    "perception", "confidence", "messages",
+    "text", "as-run", "fair", "optimum", "gap", "gate", "mixed", "capacity", "fairness",
+    "humans", "perception", "confidence", "messages",
 )  # fmt: skip
 
 #: Studies that choose runs by the results of earlier ones, so they cannot be listed in advance.

@@ -19,6 +19,7 @@ CONTROLLERS = (
     "dim", "dim:gate=harmonious", "fixed-time", "adaptive", "all-way-stop", "max-pressure", "v2ic",
     "reservation", "slots",
 )  # fmt: skip
+PASSED = "dim:gate=passed"
 DENSITIES = (150.0, 200.0, 250.0, 300.0, 350.0)
 MEASURES = ("waiting_time_s", "travel_time_s")
 
@@ -41,7 +42,7 @@ def outside(name: str, density: float, seeds: range, horizon: float) -> list[obj
     return [(name, density, ours, theirs)]
 
 
-@pytest.mark.parametrize("name", CONTROLLERS)
+@pytest.mark.parametrize("name", [*CONTROLLERS, pytest.param(PASSED, marks=pytest.mark.slow)])
 def test_a_quarter_of_an_hour_agrees(name: str) -> None:
     assert outside(name, 250.0, range(1, 2), 900.0) == []
 

@@ -94,7 +94,10 @@ CONTROLLERS: tuple[Controller, ...] = (
 )  # fmt: skip
 
 
-@pytest.mark.parametrize("controller", CONTROLLERS, ids=lambda c: c.name)
+@pytest.mark.parametrize(
+    "controller", [*CONTROLLERS, pytest.param(Dim(gate="passed"), marks=pytest.mark.slow)],
+    ids=lambda c: c.name,
+)  # fmt: skip
 @pytest.mark.parametrize(
     ("arms", "horizon"), [((4,), 60.0), pytest.param((3, 5), 120.0, marks=pytest.mark.slow)]
 )

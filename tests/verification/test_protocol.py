@@ -215,6 +215,16 @@ def test_every_lane_can_starve(gate: str, order: str, priorities: str) -> None:
             assert "turn" in {event.what for event in lasso.cycle}
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(("order", "priorities"), [("size", "fixed"), ("lanes", "waiting")])
+def test_behind_the_gate_passed_every_lane_can_starve(order: str, priorities: str) -> None:
+    """A stream that is never out of a vehicle's way; without near turns out of two lanes."""
+    protocol = Protocol(paper(3), order, "passed", priorities=priorities, closed=("a1", "b1"))
+    for lasso in starvation(protocol):
+        assert lasso is not None
+        replay(protocol, lasso)
+
+
 @pytest.mark.parametrize(
     ("gate", "states"),
     [("clear", 9379), pytest.param("harmonious", 83736, marks=pytest.mark.slow)],

@@ -17,7 +17,7 @@ from minisim.control import Command, Site, View
 from minisim.errors import InputError
 from scenarios import four_way
 from scenarios.strategies import scenarios
-from tests.builders import digest, drained, said, seen
+from tests.builders import digest, drained, replayed, said, seen
 
 
 def test_turns_follow_the_clock() -> None:
@@ -173,3 +173,23 @@ def test_an_observer_agrees(passed: dict[int, int], memory: int, early: int, lat
     seen = {lane: max(when, began) / 10 for lane, when in passed.items()}
     rankings = [longest_waiting(now / 10, 5, since, memory / 10) for since in (truth, seen)]
     assert rankings[0] == rankings[1]
+
+
+def crosses(every: float, **rules: str) -> bool:
+    """Whether a vehicle d2 gets across against an a2 every so many seconds, in five minutes."""
+    stream = [(every * k, 0, 2) for k in range(int(300 / every))]
+    scenario = replayed(four_way(0, profile="fair"), *stream, (100.0, 3, 2), horizon=300.0)
+    trips = minisim.simulate(scenario, Dim(**rules)).columns
+    return bool(trips.arrived[trips.lane == 3].all())
+
+
+@pytest.mark.parametrize("priorities", ["rotating", "waiting"])
+def test_behind_the_harmonious_gate_priorities_decide_only_once_the_junction_is_empty(
+    priorities: str,
+) -> None:
+    """An a2 every 3 s never leaves it empty, one every 3.5 s does (docs/background/safety.md)."""
+    assert not crosses(3.0, gate="harmonious", priorities=priorities)
+    assert crosses(3.5, gate="harmonious", priorities=priorities)
+    assert not crosses(3.5, gate="harmonious")
+    assert crosses(3.0, gate="passed", priorities=priorities)
+    assert crosses(3.0, gate="clear", priorities=priorities)

@@ -120,7 +120,7 @@ def test_run_help_fits_on_two_screens() -> None:
 
 @pytest.mark.parametrize(("command", "heavy"), [
     (["--help"], {"numpy", "shapely", "pandas", "matplotlib", "numba", "networkx", "pymunk"}),
-    (["run", "four-way", "--horizon", "5"], {"pandas", "matplotlib", "scipy.linalg"}),
+    (["run", "four-way", "--horizon", "5"], {"pandas", "matplotlib", "networkx", "scipy.linalg"}),
     (["run", "four-way", "--horizon", "5", "-p", "as_run"], {"scipy.linalg"}),  # makes arrays
 ])  # fmt: skip
 def test_a_command_loads_what_it_uses(command: list[str], heavy: set[str]) -> None:
