@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from minisim.control import NOTHING, Command, Plan, Site, View
 from minisim.errors import InputError
+from minisim.junction.movements import movements_of
 from minisim.names import Name
 from minisim.parameters import Reals, declared, real, reals
 from scenarios.environments.passing import Passing
@@ -48,7 +49,8 @@ def wishes(
     own = x[:, : x.shape[1] - m].reshape(len(x), arms, -1)
     score = (x[:, _turned(arms)] @ w[:, :-1, None])[..., 0] + w[:, -1:]
     score[own[:, :, 0] == 0.0] = -np.inf
-    movement = np.arange(arms) * (arms - 1) + own[:, :, 4:-1].argmax(axis=2)
+    wanted = own[:, :, 4:-1].argmax(axis=2) + 1
+    movement = movements_of(arms).index_of[np.arange(arms), wanted]
     taken = x[:, -m:] > 0.0
     chosen = np.zeros((len(x), m), np.int8)
     each = np.arange(len(x))

@@ -7,8 +7,8 @@ import pytest
 
 from dim import Zones
 from dim.humans.drivers import Drivers
-from dim.humans.queue import LINE, Queue
-from minisim.control import HALTING, Observed
+from dim.humans.queue import Queue
+from minisim.control import AT_LINE, HALTING, Observed
 from tests.builders import seen, view
 
 DRIVERS = Drivers(0.5, 1)
@@ -33,8 +33,8 @@ def queue(*looks: tuple[Observed, ...]) -> Queue:
         (X, ZONES.yellow_start + 1e-3, 5.0, False),
         (X, 0.0, 0.0, True),
         (X, -1e-3, 0.0, False),
-        (P, ZONES.green + LINE, HALTING, True),
-        (P, ZONES.green + LINE + 1e-3, 0.0, False),
+        (P, ZONES.green + AT_LINE, HALTING, True),
+        (P, ZONES.green + AT_LINE + 1e-3, 0.0, False),
         (P, ZONES.green, HALTING + 1e-3, False),
     ],
 )
