@@ -23,7 +23,7 @@ Floats = npt.NDArray[np.float64]
 
 def size(arms: int) -> int:
     """How many weights a policy has: one for each number of an observation, and a constant."""
-    return arms * (2 * (arms - 1) + 5) + 1
+    return 2 * len(movements_of(arms)) + 5 * arms + 1
 
 
 def wishes(
