@@ -5,11 +5,13 @@ from __future__ import annotations
 import html
 import json
 import re
+from collections.abc import Sequence
 from importlib import resources
 
 from figures.player.ground import look
 from figures.player.scene import Scene, dumped, scene
-from minisim.errors import InputError
+from figures.style import suffix_of
+from minisim.errors import InputError, instance, items, printable
 from minisim.files import AnyPath, write_text
 from minisim.results.run import Run
 
@@ -33,7 +35,8 @@ class Player:
             raise InputError(f"two runs side by side need the same arrivals: {different}")
 
     def save(self, path: AnyPath) -> None:
-        """Write the page, whole or not at all; raises `FileError`."""
+        """Write the page, whole or not at all; raises `FileError`, or `InputError` unless .html."""
+        suffix_of(path, "a page", ("html",))
         write_text(path, self.page())
 
     def page(self, attributes: str = "autoplay") -> str:
@@ -55,17 +58,33 @@ class Player:
 
 
 def play(
-    run: Run, beside: Run | None = None, *, start: float = 0.0, seconds: float = 60.0
+    run: Run,
+    beside: Run | None = None,
+    *,
+    start: float = 0.0,
+    seconds: float = 60.0,
+    names: Sequence[str] = (),
 ) -> Player:
     """`seconds` of a run from `start` on [s], perhaps `beside` another one, to look at.
 
     Click a vehicle there to read why it waits. Two runs share one clock. For example,
-    `play(run, start=300).save("film.html")`.
+    `play(run, start=300).save("film.html")`. `names` are the headings of the runs, by default
+    their controllers.
 
-    Raises `InputError` as `scene`, and for runs with different arrivals.
+    Raises `InputError` as `scene`, for runs with different arrivals, and unless there are as many
+    names as runs.
     """
     runs = [run] if beside is None else [run, beside]
-    return Player(*(scene(it, start=start, seconds=seconds) for it in runs))
+    for it in runs:
+        instance("run", it, Run)
+    scenes = [scene(it, start=start, seconds=seconds) for it in runs]
+    if names:
+        told = items("names", names, "text, one per run")
+        if len(told) != len(runs):
+            raise InputError(f"names must be one per run, {len(runs)}, got {len(told)}")
+        for it, name in zip(scenes, told, strict=True):
+            it["controller"] = printable("name of a run", name)
+    return Player(*scenes)
 
 
 def script() -> str:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from minisim.errors import integer, number
+from minisim.errors import InputError, integer, number
 from minisim.reasons import Reason, Told
 from minisim.ticks import first_tick
 
@@ -38,6 +38,8 @@ class Account:
     def why(self, vehicle: int, time: float) -> Reason:
         """See `Run.why`."""
         trips, dt = self.run.columns, self.run.site.dt
+        if not len(trips.vehicle):
+            raise InputError("the run has no vehicles, so none waits")
         integer("vehicle", vehicle, low=0, high=len(trips.vehicle) - 1)
         number("time [s]", time, low=0, high=trips.end)
         comes, departs = float(trips.demand_time[vehicle]), float(trips.depart[vehicle])

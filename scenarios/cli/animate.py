@@ -16,6 +16,8 @@ from scenarios.cli.shared.terminal import bar
 
 #: What matplotlib draws, frame by frame.
 FILMS = ("gif", "mp4")
+#: What is shown by default: from then on, for so long [s].
+BEGIN, SECONDS = 300.0, 60.0
 
 
 @app.command(
@@ -30,8 +32,13 @@ def animate(
     latency: options.Latency = 0.0,
     jitter: options.Jitter = 0.0,
     loss: options.Loss = 0.0,
-    begin: Annotated[float, typer.Option("--from", metavar="S", help="When to begin.")] = 300.0,
-    seconds: Annotated[float, typer.Option(metavar="S", help="Simulated time to show.")] = 60.0,
+    since: Annotated[
+        float | None,
+        options.option("When to begin; 300 by default, 0 in a short run.", "S", "--from"),
+    ] = None,
+    length: Annotated[
+        float | None, options.option("Simulated time to show; 60 by default.", "S", "--seconds")
+    ] = None,
     out: Annotated[
         Path,
         options.option("What to write: .html (a page with a player; film.html by default), .gif, "
@@ -87,8 +94,11 @@ def animate(
         unit=unit, fleet=fleet, lane_width=lane_width, profile=profile, side=side, node=node,
         horizon=horizon, demand_time=demand_time,
     )  # fmt: skip
+    begin = (BEGIN if junction.horizon > BEGIN else 0.0) if since is None else since
     number("--from [s]", begin, low=0, below=junction.horizon)
-    number("--seconds", seconds, above=0, high=min(3600.0, junction.horizon - begin))
+    rest = junction.horizon - begin
+    seconds = min(SECONDS, rest) if length is None else length
+    number("--seconds", seconds, above=0, high=min(3600.0, rest))
     rate = 10.0 if fps is None else fps
     if film:
         frame_times(begin, seconds, rate, junction.profile.dt)

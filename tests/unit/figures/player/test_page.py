@@ -95,3 +95,25 @@ def test_the_player_has_the_look_of_the_figures() -> None:
         re.findall(r'look\("([\w-]+)"\)', text)
     )
     assert used - {"side", "full", "graph", "colour"} <= set(re.findall(r"--([\w-]+): #", text))
+
+
+def test_runs_may_be_named_and_what_is_wrong_is_told(tmp_path: Path) -> None:
+    """Two headings that only differ after the cut tell a reader nothing."""
+    run = minisim.simulate(four_way(density=300, horizon=30.0, warmup=0.0), Dim())
+    named = play(run, run, seconds=20, names=("without a monitor", "with a monitor"))
+    assert [it["controller"] for it in named.scenes] == ["without a monitor", "with a monitor"]
+    for wrong, said in (
+        (lambda: play(None), "run must be a Run"),  # type: ignore[arg-type]
+        (
+            lambda: play(run, seconds=20, names=("one", "two")),
+            "names must be one per run, 1, got 2",
+        ),
+        (
+            lambda: play(run, seconds=20, names="one"),
+            "names must be a sequence of text, one per run",
+        ),
+        (lambda: named.save(tmp_path / "x.txt"), "ends in .html"),
+    ):
+        with pytest.raises(InputError, match=said):
+            wrong()
+    assert list(tmp_path.iterdir()) == []

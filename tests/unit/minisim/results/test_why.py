@@ -113,3 +113,9 @@ def test_commands_from_outside_are_given_again() -> None:
     assert run.given
     again = run.explained.run
     assert again.columns.arrival.tobytes() == run.columns.arrival.tobytes()
+
+
+def test_a_run_without_vehicles_says_so() -> None:
+    run = simulate(four_way(density=0, horizon=10.0, warmup=0.0), Dim())
+    with pytest.raises(InputError, match="the run has no vehicles"):
+        run.why(0, 1.0)

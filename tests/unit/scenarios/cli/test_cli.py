@@ -522,7 +522,7 @@ def test_animate_checks(capsys: Captured, tmp_path: Path, monkeypatch: pytest.Mo
     for file, more, said in (
         ("film.avi", (), ".html, .gif, .mp4, .json"), ("film.mp4", (), "ffmpeg"),
         ("no/film.gif", (), f"no folder {here}/no"), ("f.gif", ("--fps", "11"), "fps"),
-        ("f.gif", ("--from", "280", "--horizon", "300"), "--seconds must be"),
+        ("f.gif", ("--from", "280", "--seconds", "60", "--horizon", "300"), "--seconds must be"),
         ("f.gif", ("--from", "280", "--horizon", "200"), "--from [s] must be"),
     ):  # fmt: skip
         assert said in fails(capsys, "animate", "four-way", "-o", f"{here}/{file}", *more)
@@ -904,3 +904,14 @@ def test_the_head_of_a_run_has_its_fleet_and_the_unit_of_its_inflow(capsys: Capt
     assert ": 200 veh/h/lane (175 pcu/h/lane), profile paper, fleet" in ok(
         capsys, *run.split(), "--unit", "pcu"
     )
+
+
+@pytest.mark.parametrize("horizon", ["200", "330"])
+def test_animate_shows_what_there_is_of_a_short_run(
+    capsys: Captured, tmp_path: Path, horizon: str
+) -> None:
+    """Nobody has asked for the 60 s from 300 s on."""
+    out = tmp_path / "x.json"
+    ok(capsys, "animate", "four-way", "--horizon", horizon, "--seed", "1", "-o", str(out))
+    made = json.loads(out.read_text())
+    assert (made["start"], made["steps"] * made["step"]) in ((0.0, 60.0), (300.0, 30.0))
