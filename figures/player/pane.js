@@ -313,7 +313,10 @@ class Pane {
       const more = between > 0 ? ` ${between === 1 ? "One more is" : `${between} more are`} ahead of that one, and at the front:` : "";
       if (first && car) text = first === last ? first.sentence : `${first.sentence}${more} ${last.sentence}`;
       else if (car) text = `Vehicle ${vehicle} is here. This scene has no reasons.`;
-      else text = `Vehicle ${vehicle} is not in the scene at this time.`;
+      else {
+        const track = scene.tracks.find((it) => it.id === vehicle);
+        text = `Vehicle ${vehicle} ${!track ? "is not in this scene" : this.step < track.from ? "is not there yet" : "has left the picture"}. N chooses the next.`;
+      }
       const struck = scene.data.collisions.filter(([when, ...both]) => when <= this.step && both.includes(vehicle))
         .map(([, one, other]) => `vehicle ${one === vehicle ? other : one}`);
       if (struck.length) text = `It has collided with ${struck.join(" and ")}. ${text}`;
@@ -324,7 +327,7 @@ class Pane {
   /** The harmony graph: vehicles whose ways do not conflict are joined; those that go are filled. */
   drawGraph() {
     const { scene, player } = this, nodes = scene.participants(this.cars).slice(0, 12);
-    const key = nodes.map((it) => `${it.track.id}${it.goes}`).join() + player.chosen;
+    const key = nodes.map((it) => `${it.track.id}${it.goes}${it.stands}`).join() + player.chosen;
     if (key === this.graphKey) return;
     this.graphKey = key;
     const make = (tag, attributes, text) => {
@@ -346,7 +349,7 @@ class Pane {
     }));
     nodes.forEach((it, k) => {
       const [cx, cy] = places[k], on = it.track.id === player.chosen;
-      make("circle", { cx, cy, r: 23, class: `node${it.goes ? " goes" : ""}${on ? " chosen" : ""}` });
+      make("circle", { cx, cy, r: 23, class: `node${it.goes ? " goes" : it.stands ? " stands" : ""}${on ? " chosen" : ""}` });
       make("text", { x: cx, y: cy - 1, class: it.goes ? "goes" : "" }, scene.ways[it.track.way].name);
       make("text", { x: cx, y: cy + 14, class: `small${it.goes ? " goes" : ""}` }, it.track.id);
     });
