@@ -82,8 +82,8 @@ def play(
         told = items("names", names, "text, one per run")
         if len(told) != len(runs):
             raise InputError(f"names must be one per run, {len(runs)}, got {len(told)}")
-        for it, name in zip(scenes, told, strict=True):
-            it["controller"] = printable("name of a run", name)
+        for made, name in zip(scenes, told, strict=True):
+            made["controller"] = printable("name of a run", name)
     return Player(*scenes)
 
 
