@@ -55,7 +55,6 @@ def test_what_a_reader_sees_is_enough(path: Path) -> None:
 
 
 @names
-@pytest.mark.slow
 def test_the_code_of_a_lesson_runs(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from matplotlib import pyplot as plt
 

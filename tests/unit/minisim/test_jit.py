@@ -52,6 +52,7 @@ FORKING = """
 import json, os, sys, numba
 
 numba.njit(lambda x: x + 1.0)(1.0)
+sys.dont_write_bytecode = True  # sources change within a second, which bytecode would not notice
 for line in sys.stdin:
     folder, code = json.loads(line)
     if not (child := os.fork()):
