@@ -95,6 +95,8 @@ class Simulation(Stepped):
         if self._options.gui or not sys.platform.startswith("linux"):
             raise SumoError("a run in SUMO can be forked on Linux only, and not in sumo-gui")
         self._begin()
+        if self._ended is not None:
+            self.result()  # from files that the copy does not have
         twin = copy(self)
         twin._hosted = deepcopy(self._hosted, {id(it): it for it in self._hosted.shared})
         twin._given, twin._orders = self._given.copy(), self._orders.copy()
