@@ -1,4 +1,4 @@
-"""A view as a picture: the junction as it is now, for whoever drives a run from outside."""
+"""A view as a picture: the junction as it is now, for driving a run from outside."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ class Radio:
     """The messages that vehicles and a controller send each other.
 
     If none fails, a vehicle sends one for each view that shows it, and a controller one for each
-    command to a vehicle. If some fail, `minisim.link` says who sends what.
+    command to a vehicle. If some fail, `minisim.link` says which messages are sent.
     """
 
     # The smaller and more frequent of the two messages by which 3GPP compares radio links between

@@ -43,7 +43,7 @@ def connect(channel: Channel, folder: Path) -> Channel:
 def forked(job: Job, caller: Channel, asked: Fork) -> Job:
     """Fork this process. Each copy goes on from here and returns its own job.
 
-    In the new one, `caller` is whoever asked for it, by pipes of its own.
+    In the new one, `caller` is the process that asked for it, by pipes of its own.
     """
     folder = Path(asked.folder)
     target = os.open(folder / PIPES[1], os.O_WRONLY)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from dim.proofs.modelcheck import Exploration
     from scenarios.scenario import Scenario
 
-#: With more arms there are too many states: with the gate "passed", they say who is in whose way.
+#: With more arms there are too many states; those of the gate "passed" also say which bars which.
 MAX_ARMS, MAX_ARMS_PASSED = 4, 3
 
 

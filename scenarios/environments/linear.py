@@ -112,7 +112,7 @@ class LearntSession:
         self.plan = Plan(period=site.period("interval", learnt.interval), sight=road)
 
     def decide(self, view: View) -> Sequence[Command]:
-        """Look, wish, and let go whom it is safe to let go."""
+        """Look, wish, and give the right of way as far as that is safe."""
         site, passing = self._site, self._passing
         seen = observed(view, passing, site, self._learnt.sight)
         wished: Any = wishes(self._weights, seen[None], site.conflicts)[0]

@@ -1,4 +1,4 @@
-"""Who may go: those for whom it is wished, as far as that is safe."""
+"""Which vehicles may go: those that are wished to, as far as that is safe."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class Passing:
         return not any(conflicts[self.movement(other)] for other in settled)
 
     def commands(self, junction: Junction, wished: Callable[[Observed], bool]) -> list[Command]:
-        """Give the right of way to those asking for whom it is wished; take it from the others."""
+        """Give the right of way to those that ask and are wished to go; take it from the others."""
         chosen: list[Observed] = []
         for vehicle in sorted(junction.asking, key=lambda v: (v.demand_time, v.lane)):
             taken = junction.settled + chosen if self._masked else []

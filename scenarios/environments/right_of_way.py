@@ -9,10 +9,9 @@ import numpy.typing as npt
 from gymnasium import spaces
 
 from minisim.control import HALTING, Plan, Site, View
-from minisim.errors import instance
+from minisim.errors import instance, number
 from scenarios.environments.environment import Environment, Observation, box
 from scenarios.environments.passing import Passing
-from scenarios.environments.world import steps
 from scenarios.scenario import Scenario
 
 #: What counts as far, long and many, where an observation is 1 [m], [s], vehicles.
@@ -57,7 +56,7 @@ class RightOfWayEnv(Environment):
     ) -> None:
         super().__init__(scenario, interval, render_mode)
         instance("masked", masked, bool)
-        self._sight, self._masked = steps("sight", sight), masked
+        self._sight, self._masked = number("sight [m]", sight, above=0, high=1000), masked
         intersection = self.world.site.intersection
         self._n, self._m = intersection.n, len(intersection.movements)
         self._turns = self._n - 1

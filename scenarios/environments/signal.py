@@ -14,7 +14,6 @@ from baselines.signals.phases import PhaseSession, Verdict, on_detector
 from minisim.control import HALTING, Plan, Site, View
 from minisim.errors import instance, number
 from scenarios.environments.environment import Environment, Observation, box
-from scenarios.environments.world import steps
 from scenarios.scenario import Scenario
 
 #: Length of the detectors, as of `baselines.signals.max_pressure.MaxPressure` [m].
@@ -90,7 +89,10 @@ class SignalEnv(Environment):
     ) -> None:
         super().__init__(scenario, interval, render_mode)
         instance("facing", facing, bool)
-        self._timing = steps("min_green", min_green), number("amber [s]", amber, low=0, high=60)
+        self._timing = (
+            number("min_green [s]", min_green, above=0, high=3600),
+            number("amber [s]", amber, low=0, high=60),
+        )
         self._facing = facing
         self._session = self._new()
         self._p, self._n = len(self._session.phases), self.world.site.intersection.n

@@ -15,10 +15,10 @@ from pettingzoo import ParallelEnv
 from dim import Dim
 from dim.perception import ROUNDING
 from minisim.control import Observed, View
-from minisim.errors import choice, instance
+from minisim.errors import choice, instance, number
 from scenarios.environments.environment import SEEDS, Observation, box
 from scenarios.environments.passing import Passing
-from scenarios.environments.world import World, steps
+from scenarios.environments.world import World
 from scenarios.scenario import Scenario
 
 #: How much of the roads a picture shows [m].
@@ -75,7 +75,7 @@ class VehiclesEnv(ParallelEnv[str, Observation, int]):  # type: ignore[misc]  # 
     ) -> None:
         instance("masked", masked, bool)
         self.world = World(scenario, interval)
-        self._masked, self._crash = masked, steps("crash", crash)
+        self._masked, self._crash = masked, number("crash [s]", crash, above=0, high=1e6)
         if render_mode is not None:
             choice("render_mode", render_mode, self.metadata["render_modes"])
         self.render_mode = render_mode

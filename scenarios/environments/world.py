@@ -6,7 +6,7 @@ import numpy as np
 
 from minisim.control import External, Plan, Site, View
 from minisim.engine.collision import Collision
-from minisim.errors import instance, number
+from minisim.errors import instance
 from minisim.simulation import Simulation
 from scenarios.library import four_way
 from scenarios.scenario import Scenario
@@ -63,8 +63,3 @@ class World:
                 self._departed[v.lane] = v.rank + 1
         wanted = int(np.searchsorted(self._demanded, view.time, side="right"))
         return wanted - sum(self._departed) + len(view.vehicles)
-
-
-def steps(name: str, value: float) -> float:
-    """A length of time that is given to an environment [s]."""
-    return number(name, value, above=0, high=3600)

@@ -910,7 +910,7 @@ def test_the_head_of_a_run_has_its_fleet_and_the_unit_of_its_inflow(capsys: Capt
 def test_animate_shows_what_there_is_of_a_short_run(
     capsys: Captured, tmp_path: Path, horizon: str
 ) -> None:
-    """Nobody has asked for the 60 s from 300 s on."""
+    """The 60 s from 300 s on are only a default."""
     out = tmp_path / "x.json"
     ok(capsys, "animate", "four-way", "--horizon", horizon, "--seed", "1", "-o", str(out))
     made = json.loads(out.read_text())

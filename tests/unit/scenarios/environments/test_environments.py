@@ -81,7 +81,7 @@ def test_other_junctions_and_seeds(name: str, make: Any) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_the_reward_is_the_time_spent_up_to_the_exit(name: str) -> None:
-    """By the trajectories of the same run: who has come, and who has not left the junction."""
+    """By the trajectories of the same run: which have come, and which have left the junction."""
     env = gymnasium.make(name, scenario=short(90.0, density=500.0))
     rewards, _ = episode(env, 1)
     world = env.unwrapped.world
@@ -266,7 +266,7 @@ def test_an_agent_is_told_what_it_may_do() -> None:
         ("RightOfWayEnv", {"scenario": "four-way"}, "scenario must be a Scenario"),
         ("SignalEnv", {"render_mode": "ansi"}, "unknown render_mode 'ansi'"),
         ("SignalEnv", {"amber": -1}, "amber"),
-        ("VehiclesEnv", {"crash": 0}, "crash must be above 0"),
+        ("VehiclesEnv", {"crash": 0}, r"crash \[s\] must be above 0"),
     ],
 )
 def test_wrong_arguments_are_told(make: str, wrong: dict[str, Any], message: str) -> None:
