@@ -26,42 +26,19 @@ def may_touch(
     The separating-axis test is exact, and the rectangles are a little larger than the bodies, so
     it misses no touch that pymunk would find.
     """
-    n = count(lanes)
-    inside = False
-    where, away = floats[S], floats[AWAY]
-    for i in range(n):
-        inside |= law.entry <= where[i] <= away[i]
-    if not inside:
+    if not several(floats, law, count(lanes)):
         return False
-    ends, shape, headings = layout.ends, layout.shape, layout.headings
     found = 0
     for lane in range(len(lanes)):
         first = lanes[lane]["slot"]
         for i in range(first, first + lanes[lane]["driving"]):
-            s, p, length = where[i], ints[PATH, i], floats[LENGTH, i]
-            if s < law.entry - law.longest:
+            if floats[S, i] < law.entry - law.longest:
                 break
-            if s > away[i]:
-                continue
-            if found == len(bodies):
-                return True
-            past, crossing = s - law.entry, ends[p, 0] - law.entry
-            x, y = place(shape[p], headings[p], crossing, past)
-            kind = ints[TYPE, i]
-            axle = layout.types[kind].rear_axle
-            if axle > 0.0:
-                ux, uy = drag(shape[p], headings[p], crossing, past, layout.trails[kind, p], axle)
-            else:
-                x_rear, y_rear = place(shape[p], headings[p], crossing, past - length)
-                along = math.hypot(x - x_rear, y - y_rear)
-                ux, uy = (x - x_rear) / along, (y - y_rear) / along
-            bodies[found, 0] = x - ux * length / 2.0
-            bodies[found, 1] = y - uy * length / 2.0
-            bodies[found, 2] = ux
-            bodies[found, 3] = uy
-            bodies[found, 4] = length / 2.0 + TOUCH_MARGIN
-            bodies[found, 5] = layout.types[kind].width / 2.0 + TOUCH_MARGIN
-            found += 1
+            if floats[S, i] <= floats[AWAY, i]:
+                if found == len(bodies):
+                    return True
+                embody(floats, ints, layout, law, i, bodies[found])
+                found += 1
     for i in range(found):
         for j in range(i):
             dx = bodies[i, 0] - bodies[j, 0]
@@ -73,6 +50,40 @@ def may_touch(
             ):  # fmt: skip
                 return True
     return False
+
+
+@njit_inline
+def several(floats: Floats, law: Law, n: int) -> bool:
+    """Whether a vehicle is in the junction, or not far past it, and another one there or near."""
+    s, away = floats[S], floats[AWAY]
+    inside, near = False, 0
+    for i in range(n):
+        inside |= (s[i] >= law.entry) & (s[i] <= away[i])
+        near += (s[i] >= law.entry - law.longest) & (s[i] <= away[i])
+    return inside and near > 1
+
+
+@njit_inline
+def embody(floats: Floats, ints: Ints, layout: Layout, law: Law, i: int, body: Floats) -> None:
+    """Fill in a vehicle's body: its centre, its heading, and half of its length and width [m]."""
+    p, kind, length = ints[PATH, i], ints[TYPE, i], floats[LENGTH, i]
+    shape, headings = layout.shape[p], layout.headings[p]
+    past, crossing = floats[S, i] - law.entry, layout.ends[p, 0] - law.entry
+    x, y = place(shape, headings, crossing, past)
+    axle = layout.types[kind].rear_axle
+    if past <= 0.0:
+        ux, uy = headings[0], headings[1]
+    elif axle > 0.0:
+        ux, uy = drag(shape, headings, crossing, past, layout.trails[kind, p], axle)
+    else:
+        x_rear, y_rear = place(shape, headings, crossing, past - length)
+        dx, dy = x - x_rear, y - y_rear
+        along = math.sqrt(dx * dx + dy * dy)
+        ux, uy = dx / along, dy / along
+    body[0], body[1] = x - ux * length / 2.0, y - uy * length / 2.0
+    body[2], body[3] = ux, uy
+    body[4] = length / 2.0 + TOUCH_MARGIN
+    body[5] = layout.types[kind].width / 2.0 + TOUCH_MARGIN
 
 
 @njit_inner

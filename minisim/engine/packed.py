@@ -49,7 +49,16 @@ def empty_pack(vehicles: Records, lanes: Records, layout: Layout) -> tuple[Float
     longest_queue = int((layout.ends[:, 1] - layout.ends[:, 3]).max() / shortest) + 2
     most = min(len(vehicles), len(lanes) * longest_queue)
     width = (most + 7) // 8 * 8 + 8
-    return np.ones((FLOATS, width)), np.zeros((INTS, width), np.int64)
+    ints = aligned(INTS * width).view(np.int64)
+    ints[:] = 0
+    return aligned(FLOATS * width).reshape(FLOATS, width), ints.reshape(INTS, width)
+
+
+def aligned(size: int) -> Floats:
+    """Ones that begin at a cache line of 64 bytes, so that no vector of them spans two."""
+    ones = np.ones(size + 8)
+    start = -ones.ctypes.data // 8 % 8
+    return ones[start : start + size]
 
 
 @njit_inline
@@ -103,20 +112,10 @@ def admit(
 def shift(floats: Floats, ints: Ints, lanes: Records, lane: int, at: int, by: int) -> None:
     """Make room for a slot on a lane (`by` 1), or close the gap that one leaves (`by` -1)."""
     n = count(lanes)
-    if by > 0:
-        for k in range(FLOATS):
-            for i in range(n, at, -1):
-                floats[k, i] = floats[k, i - 1]
-        for k in range(INTS):
-            for i in range(n, at, -1):
-                ints[k, i] = ints[k, i - 1]
-    else:
-        for k in range(FLOATS):
-            for i in range(at, n - 1):
-                floats[k, i] = floats[k, i + 1]
-        for k in range(INTS):
-            for i in range(at, n - 1):
-                ints[k, i] = ints[k, i + 1]
+    for k in range(FLOATS):
+        shift_row(floats[k, at : n + 1], by)
+    for k in range(INTS):
+        shift_row(ints[k, at : n + 1], by)
     for i in range(n + by):
         ints[AHEAD, i] = shifted(ints[AHEAD, i], at, by)
     for arm in range(len(lanes)):
@@ -124,6 +123,18 @@ def shift(floats: Floats, ints: Ints, lanes: Records, lane: int, at: int, by: in
         if arm > lane:
             lanes[arm]["slot"] += by
     lanes[lane]["driving"] += by
+
+
+@njit_inline
+def shift_row(row: Floats | Ints, by: int) -> None:
+    """Move all but the last one back (`by` 1), or all but the first forward (`by` -1)."""
+    last = len(row) - 1
+    if by > 0:
+        for i in range(last):
+            row[last - i] = row[last - i - 1]
+    else:
+        for i in range(last):
+            row[i] = row[i + 1]
 
 
 @njit_inline
