@@ -26,7 +26,7 @@ def may_touch(
     The separating-axis test is exact, and the rectangles are a little larger than the bodies, so
     it misses no touch that pymunk would find.
     """
-    if not several(floats, law, count(lanes)):
+    if not crossed(floats, law, count(lanes)):
         return False
     found = 0
     for lane in range(len(lanes)):
@@ -41,26 +41,19 @@ def may_touch(
                 found += 1
     for i in range(found):
         for j in range(i):
-            dx = bodies[i, 0] - bodies[j, 0]
-            dy = bodies[i, 1] - bodies[j, 1]
-            long, wide = bodies[i, 4] + bodies[j, 4], bodies[i, 5] + bodies[j, 5]
-            if dx * dx + dy * dy < long * long + wide * wide and rectangles_meet(
-                dx, dy, bodies[i, 2], bodies[i, 3], bodies[j, 2], bodies[j, 3],
-                bodies[i, 4], bodies[i, 5], bodies[j, 4], bodies[j, 5],
-            ):  # fmt: skip
+            if bodies_meet(bodies[i], bodies[j]):
                 return True
     return False
 
 
 @njit_inline
-def several(floats: Floats, law: Law, n: int) -> bool:
-    """Whether a vehicle is in the junction, or not far past it, and another one there or near."""
+def crossed(floats: Floats, law: Law, n: int) -> bool:
+    """Whether any vehicle is in the junction, or not far past it."""
     s, away = floats[S], floats[AWAY]
-    inside, near = False, 0
+    inside = False
     for i in range(n):
         inside |= (s[i] >= law.entry) & (s[i] <= away[i])
-        near += (s[i] >= law.entry - law.longest) & (s[i] <= away[i])
-    return inside and near > 1
+    return inside
 
 
 @njit_inline
@@ -84,6 +77,16 @@ def embody(floats: Floats, ints: Ints, layout: Layout, law: Law, i: int, body: F
     body[2], body[3] = ux, uy
     body[4] = length / 2.0 + TOUCH_MARGIN
     body[5] = layout.types[kind].width / 2.0 + TOUCH_MARGIN
+
+
+@njit_inline
+def bodies_meet(one: Floats, other: Floats) -> bool:
+    """Whether two bodies meet, as `embody` fills them in; most are too far apart for a long test."""
+    dx, dy = one[0] - other[0], one[1] - other[1]
+    reach = one[4] + one[5] + other[4] + other[5]  # no corner is farther from its centre
+    return dx * dx + dy * dy < reach * reach and rectangles_meet(
+        dx, dy, one[2], one[3], other[2], other[3], one[4], one[5], other[4], other[5]
+    )
 
 
 @njit_inner
