@@ -81,7 +81,7 @@ def embody(floats: Floats, ints: Ints, layout: Layout, law: Law, i: int, body: F
 
 @njit_inline
 def bodies_meet(one: Floats, other: Floats) -> bool:
-    """Whether two bodies meet, as `embody` fills them in; most are too far apart for a long test."""
+    """Whether two bodies, as `embody` fills them in, meet; most are too far apart."""
     dx, dy = one[0] - other[0], one[1] - other[1]
     reach = one[4] + one[5] + other[4] + other[5]  # no corner is farther from its centre
     return dx * dx + dy * dy < reach * reach and rectangles_meet(

@@ -1,9 +1,10 @@
 """How vehicles choose their accelerations, from the state at the beginning of a step.
 
 Three passes over the packed arrays: who the leaders are, what they ask for, and the acceleration.
-Plain loops over few arrays each, so that the compiler vectorises them. A vehicle with nothing but a
-leader ahead, which is most of them, needs no more than these loops; the others are flagged, and
-take `careful`.
+Plain loops, so that the compiler vectorises them: each writes one array, and reads seven at most.
+None changes an array only where a condition holds, or to a minimum of what it was. That would become
+a masked store, for which the next loop has to wait. A vehicle with nothing but a leader ahead, which
+is most of them, needs no more than these loops; the others are flagged, and take `careful`.
 """
 
 from __future__ import annotations
