@@ -190,11 +190,11 @@ class _Server:
 
     def __init__(self) -> None:
         self.control, its_end = socket.socketpair()
-        method = "fork" if _has_one_thread() else "spawn"
-        self.forked, self.used = method == "fork", False
+        self.forked, self.used = _has_one_thread(), False
         with its_end, warnings.catch_warnings():
             warnings.filterwarnings("ignore", MULTI_THREADED, DeprecationWarning)
-            process = get_context(method).Process(target=_serve, args=(its_end, method))
+            method = get_context("fork") if self.forked else get_context("spawn")
+            process = method.Process(target=_serve, args=(its_end, self.forked))
             process.start()
         self.stop = Finalize(self, _terminate, (process, self.control), exitpriority=1)
 
@@ -253,10 +253,10 @@ def _stop_server() -> None:
         _SERVERS.clear()
 
 
-def _serve(control: socket.socket, method: str) -> None:
+def _serve(control: socket.socket, forked: bool) -> None:
     """Become a worker in a fork for each pair of handles that comes; end when the parent does."""
-    if method == "fork":
-        _close_all_but(control.fileno(), getfd())
+    if forked:
+        _close_all_but(control.fileno(), getfd() or 0)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     _load()
