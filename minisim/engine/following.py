@@ -2,9 +2,10 @@
 
 Three passes over the packed arrays: who the leaders are, what they ask for, and the acceleration.
 Plain loops, so that the compiler vectorises them: each writes one array, and reads seven at most.
-None changes an array only where a condition holds, or to a minimum of what it was. That would become
-a masked store, for which the next loop has to wait. A vehicle with nothing but a leader ahead, which
-is most of them, needs no more than these loops; the others are flagged, and take `careful`.
+None changes an array only where a condition holds, or to a minimum of what it was: that would
+become a masked store, for which the next loop has to wait. A vehicle with nothing but a leader
+ahead, which is most of them, needs no more than these loops; the others are flagged, and take
+`careful`.
 """
 
 from __future__ import annotations
@@ -48,7 +49,7 @@ from minisim.engine.packed import (
     padded,
 )
 from minisim.engine.state import Floats, Ints, Layout, Records
-from minisim.jit import njit_inline, njit_inner
+from minisim.jit import njit_apart, njit_inline, njit_inner
 from minisim.laws import (
     IDM,
     IIDM,
@@ -77,7 +78,7 @@ def accelerate(
     for lane in range(len(lanes)):
         overlap |= near_junction(floats, ints, lanes, layout, law, lane)
     overlap |= weigh(floats, ints, layout, law, n)
-    choose(floats, ints, vehicles, lanes, layout, law, n)
+    choose(floats, ints, vehicles, lanes, layout, law)
     keep_rooms(floats, ints, layout, law, n)
     if braking:
         obey_brakes(floats, n)
@@ -208,12 +209,12 @@ def weigh(floats: Floats, ints: Ints, layout: Layout, law: Law, n: int) -> bool:
     return overlap
 
 
-@njit_inline
+@njit_apart
 def choose(
-    floats: Floats, ints: Ints, vehicles: Records, lanes: Records, layout: Layout, law: Law, n: int
+    floats: Floats, ints: Ints, vehicles: Records, lanes: Records, layout: Layout, law: Law
 ) -> None:
     """The acceleration that the law, the limits, the hold line and the brakes allow."""
-    flag = floats[FLAG]
+    n, flag = count(lanes), floats[FLAG]
     if law.model == IDM and law.quartic:
         s, v, acc, ratio, z = floats[S], floats[V], floats[ACC], floats[RATIO], floats[CLOSENESS]
         a, b, b_max, top = floats[A], floats[B], floats[B_MAX], floats[LIMIT]
