@@ -103,14 +103,16 @@ def test_a_wrong_value_in_an_address_is_told(browser: Browser, lab: LabServer) -
 def test_the_play_button_is_in_view(
     browser: Browser, lab: LabServer, window: tuple[int, int]
 ) -> None:
-    shown = opened(browser, lab, "seconds=60&arms=5&gate=harmonious", window)
+    setting = "seconds=60&arms=5&gate=harmonious&beside=adaptive"
+    shown = opened(browser, lab, setting, window)
     shown.until(EXPLAINED)
     box = shown.run(f"{PLAYER}.shadowRoot.querySelector('.play').getBoundingClientRect().toJSON()")
     assert 0 <= box["left"] < box["right"] <= window[0]
     assert 0 <= box["top"] < box["bottom"] <= window[1]
     assert shown.run("document.documentElement.scrollWidth") <= window[0]
-    picture = shown.run(f"{PLAYER}.panes[0].canvas.getBoundingClientRect().toJSON()")
-    assert picture["bottom"] <= box["top"], "the controls do not cover the picture"
+    for pane in (0, 1):
+        picture = shown.run(f"{PLAYER}.panes[{pane}].canvas.getBoundingClientRect().toJSON()")
+        assert picture["bottom"] <= box["top"], "the controls do not cover the picture"
 
 
 def test_an_export_is_a_download(browser: Browser, lab: LabServer, tmp_path: Path) -> None:
