@@ -289,8 +289,9 @@ class Player extends HTMLElement {
     const home = runs > 1 && !narrow && below > 110 ? this.controls.parentNode : this.panel;
     if (this.notes.parentNode !== home) home.append(this.notes);
     // A canvas is sharp if its edges are on whole pixels, so the graph beside it is as wide as some.
-    const inner = this.reports.clientWidth - 24;
-    this.style.setProperty("--graph", `${Math.min(320, narrow && inner < 430 ? inner : Math.floor(0.4 * inner))}px`);
+    const inner = (abreast > 1 ? (this.reports.clientWidth - 8) / 2 : this.reports.clientWidth) - 24;
+    const alone = narrow && abreast === 1 && inner < 430;
+    this.style.setProperty("--graph", `${Math.min(320, alone ? inner : Math.floor(0.4 * inner))}px`);
     for (const pane of this.panes) pane.ground.width = 0;
     this.draw();
   }

@@ -273,6 +273,17 @@ def test_two_runs_share_the_clock_and_the_choice(
 
 
 @pytest.mark.slow
+def test_in_a_page_as_wide_as_the_site_both_runs_say_why_beside_each_other(
+    browser: Browser, files: dict[str, Path]
+) -> None:
+    shown = opened(browser, files["two"], (880, HEIGHTS[1]))
+    for part in ("canvas", "panel"):
+        one, other = shown.run(f"{PLAYER}.panes.map((it) => it.{part}.getBoundingClientRect().top)")
+        assert one == other < HEIGHTS[1] - 200
+    at_rest(shown, files["two"])
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("window", WINDOWS)
 def test_the_other_controls(
     browser: Browser, files: dict[str, Path], window: tuple[int, int]
