@@ -156,8 +156,10 @@ class Simulation(Stepped):
         demand, movements = self._hosted.arrivals.time, self.site.intersection.movements
         return self._hosted.result(
             collisions=self.collisions,
-            columns=collect_trips(self._vehicles[self._row], demand, movements, self.site.dt, end),
-            trace=np.concatenate([*self._traces, self._trace[:0]]),
+            columns=collect_trips(
+                self._vehicles.take(self._row), demand, movements, self.site.dt, end
+            ),
+            trace=np.concatenate(self._traces) if self._traces[1:] else self._traces[0],
             rows=self._vehicles[["id", "path", "type"]].copy(),
             given=tuple(self._given),
         )
