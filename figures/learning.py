@@ -15,6 +15,8 @@ from scenarios.statistics import mean_interval
 
 #: Generations over which the course is averaged; each has arrivals of its own.
 SMOOTHED = 10
+#: Markers of one demand stand side by side, this far apart: none hides another [veh/h/lane].
+ASIDE = 9.0
 
 
 def learning_figure(training: Training, rows: pd.DataFrame) -> Figure:
@@ -31,14 +33,17 @@ def learning_figure(training: Training, rows: pd.DataFrame) -> Figure:
     left.axhline(0.0, color=style.INK, linewidth=0.8)
     left.xaxis.set_major_locator(MaxNLocator(integer=True))
     style.plot_axes(left, "Training", "generation", "median less the start policy [s/vehicle]")
-    for place, name in enumerate(dict.fromkeys(rows["controller"])):
+    names = list(dict.fromkeys(rows["controller"]))
+    for place, name in enumerate(names):
         cells = list(rows[rows["controller"] == name].groupby("density"))
-        x = [float(str(density)) + 3.0 * (place - 3) for density, _ in cells]
+        aside = ASIDE * (place - (len(names) - 1) / 2.0)
+        x = [float(str(density)) + aside for density, _ in cells]
         found = [plots.mean_estimate(cell[DELAY.name]) for _, cell in cells]
         plots.draw_line(right, x, found, style.look(name))
     once = rows.drop_duplicates(["density", "seed"]).groupby("density")[LEAST.name].mean()
     right.plot(once.index, once, color=style.MUTED, linestyle=":", linewidth=1.6, label="bound")
     right.set_yscale("log")
+    right.set_xticks(once.index)
     style.plot_axes(right, "Other arrivals", plots.DENSITY_LABEL, "mean delay [s], logarithmic")
     handles, labels = right.get_legend_handles_labels()
     plots.legend(figure, handles, labels, 0.93, 4)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ SIZE, DPI = 5.0, 100
 class Live:
     """The junction of a site, on which `draw` shows the vehicles of a view.
 
-    In a `window` it needs a display, and matplotlib's pyplot.
+    In a `window` it needs matplotlib's pyplot, and a display: it warns if there is none.
     """
 
     def __init__(self, site: Site, plan: Plan, *, window: bool = False) -> None:
@@ -27,6 +28,8 @@ class Live:
         if window:
             from matplotlib import pyplot
 
+            if pyplot.get_backend().lower() == "agg":  # what pyplot takes without a display
+                warnings.warn("no window: matplotlib finds no display here", stacklevel=2)
             pyplot.ion()
             self._figure: Any = pyplot.figure(figsize=(SIZE, SIZE), dpi=DPI)
         else:

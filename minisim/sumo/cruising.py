@@ -15,7 +15,7 @@ from minisim.engine.cruise.law import FASTEST, Cruise, follow, obey, realise
 from minisim.errors import InputError
 from minisim.laws import STOP_MARGIN, hold
 from minisim.sumo.messages import Job
-from minisim.sumo.steering import Car, Released, Steering, near
+from minisim.sumo.steering import Car, Gap, Located, Released, Steering, near
 from minisim.vehicle import CruiseVehicle
 
 #: Spacing and radar range, fixed in SUMO's code (`MSCFModel_CC`) [m].
@@ -50,8 +50,8 @@ def attributes(vehicle: CruiseVehicle) -> dict[str, object]:
 class Cruiser(Steering):
     """Steers SUMO's `CC` as a cruise control with ACC, through its desired speed."""
 
-    def __init__(self, job: Job, libsumo: Any, cruise: Cruise) -> None:
-        super().__init__(job, job.law, libsumo)
+    def __init__(self, job: Job, libsumo: Any, located: Located, cruise: Cruise) -> None:
+        super().__init__(job, job.law, libsumo, located)
         self._cruise, law = cruise, job.law
         self._limit = job.layout.section_speed[:, 0]
         top = max(cruise.cruise_speed, job.layout.section_speed.max())
@@ -107,9 +107,12 @@ class Cruiser(Steering):
             u = obey(car.told, car.v, car.advice, law, cruise)
             gaps = [*self._leading(car, lane), *self._merging(car), *self._leaving(car)]
         else:
-            gaps = [(it.s - it.traits.length - car.s, it) for it in lane[-1:]]
-        for gap, ahead in gaps:
-            u = min(u, follow(car.v, gap - car.traits.min_gap, ahead.v, law, cruise))
+            last = lane[-1:]
+            gaps = [Gap(it.s - it.traits.length - car.s, it.v, it.traits.b_max) for it in last]
+            if car.brake > 0.0:
+                gaps += self._leaving(car)
+        for it in gaps:
+            u = min(u, follow(car.v, it.distance - car.traits.min_gap, it.v, law, cruise))
         u = min(u, (FASTEST * v0 / self._limit[car.path] - car.v) / law.dt)
         return realise(car.v, car.a, u, law, cruise)
 

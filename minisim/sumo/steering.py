@@ -12,7 +12,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import takewhile
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -65,11 +65,19 @@ class Car:
         self.desired = math.inf  # the last value given to SUMO
 
 
-#: The distance to the rear of a vehicle ahead [m], and that vehicle.
-Gap = tuple[float, Car]
+class Gap(NamedTuple):
+    """What a vehicle has ahead."""
+
+    distance: float  #: to its rear [m]
+    v: float  #: its speed [m/s]
+    b_max: float  #: how hard it can brake [m/s²]
+
 
 #: Whether a vehicle has the right of way, on its own or through its lane.
 Released = Callable[[Car], bool]
+
+#: Where a vehicle is now [m] and its speed [m/s], watched or not.
+Located = Callable[[Car], tuple[float, float]]
 
 
 class Steering(ABC):
@@ -77,8 +85,8 @@ class Steering(ABC):
 
     near = -math.inf  #: `s` from which vehicles have to be steered in every step [m]
 
-    def __init__(self, job: Job, law: Law, libsumo: Any) -> None:
-        self._law, self._vehicle = law, libsumo.vehicle
+    def __init__(self, job: Job, law: Law, libsumo: Any, located: Located) -> None:
+        self._law, self._vehicle, self._located = law, libsumo.vehicle, located
         self._exit = [(float(end[0]), int(end[2])) for end in job.layout.ends]
         self._branch = job.layout.branch
         self._inside: list[Car] = []  # in the order in which they entered the junction
@@ -126,7 +134,7 @@ class Steering(ABC):
         for ahead in reversed(lane):
             rear = ahead.s - ahead.traits.length
             if rear < self._branch[ahead.path, car.path]:
-                yield rear - car.s, ahead
+                yield Gap(rear - car.s, ahead.v, ahead.traits.b_max)
                 return
 
     def _merging(self, car: Car) -> Iterator[Gap]:
@@ -134,27 +142,28 @@ class Steering(ABC):
         arm = self._exit[car.path][1]
         before = takewhile(lambda other: other is not car, self._inside)
         merging = [it for it in before if it.lane != car.lane and self._exit[it.path][1] == arm]
-        yield from (self._behind(car, ahead) for ahead in merging[-1:])
+        yield from (self._behind(car, ahead, ahead.s, ahead.v) for ahead in merging[-1:])
 
     def _leaving(self, car: Car) -> Iterator[Gap]:
         """The vehicle that was the last to leave the junction by the exit of this car, if any."""
         ahead = self._out.get(self._exit[car.path][1])
         if ahead is not None and ahead.present:
-            yield self._behind(car, ahead)
+            yield self._behind(car, ahead, *self._located(ahead))
 
-    def _behind(self, car: Car, ahead: Car) -> Gap:
-        """The gap to a vehicle, both measured from their exit."""
+    def _behind(self, car: Car, ahead: Car, s: float, v: float) -> Gap:
+        """The gap to a vehicle that is at `s`, both measured from their exit."""
         mine, other = self._exit[car.path][0], self._exit[ahead.path][0]
-        return (ahead.s - other) - ahead.traits.length - (car.s - mine), ahead
+        distance = (s - other) - ahead.traits.length - (car.s - mine)
+        return Gap(distance, v, ahead.traits.b_max)
 
 
 class Follower(Steering):
     """Steers SUMO's IDM or Krauss: limits, markings, turns and hold lines are minisim's."""
 
-    def __init__(self, job: Job, libsumo: Any) -> None:
+    def __init__(self, job: Job, libsumo: Any, located: Located) -> None:
         # SUMO's Krauss may drive vehicles with another law.
         law = job.law if job.model == "IDM" else job.law._replace(model=laws.KRAUSS)
-        super().__init__(job, law, libsumo)
+        super().__init__(job, law, libsumo, located)
         self._limits = limits(job)
         apart, exits = job.movements.apart, job.movements.exits
         crossed = apart & (exits[:, None] != exits)  # sharing neither lane nor exit
@@ -180,8 +189,10 @@ class Follower(Steering):
                 merges = alone and not held and (car.s >= entry or foremost)
                 foremost &= car.s >= entry
                 z = self._closeness(car, self._merging(car)) if merges else 0.0
-                ahead = [*self._leading(car, lane[:k])] if wary else []
-                if told:  # else no look at those that have left is recent
+                # While it slows down by command, SUMO does not follow for it either.
+                slows = car.brake > 0.0 or max(car.v, LEAST_SPEED) > car.advice
+                ahead = [*self._leading(car, lane[:k])] if wary or slows else []
+                if told or slows:
                     ahead += self._leaving(car)
                 self._steer(car, lane[:k], held, z, ahead)
                 ignoring = held or crossed
@@ -198,13 +209,13 @@ class Follower(Steering):
     def _closeness(self, car: Car, ahead: Iterable[Gap]) -> float:
         """The most that the law asks for behind these vehicles; 0 if there are none."""
         me, law = car.traits, self._law
-        asked = [float(laws.closeness(car.v, gap, it.v, me, law)) for gap, it in ahead]
+        asked = [float(laws.closeness(car.v, it.distance, it.v, me, law)) for it in ahead]
         return max(asked, default=0.0)
 
     def _room(self, car: Car, ahead: Iterable[Gap]) -> float:
         """The room in which the car must be able to stop behind these; see `laws.room_behind`."""
         me, law = car.traits, self._law
-        rooms = [laws.room_behind(gap, it.v, it.traits.b_max, me, law) for gap, it in ahead]
+        rooms = [laws.room_behind(it.distance, it.v, it.b_max, me, law) for it in ahead]
         return float(min(rooms, default=math.inf))
 
     def _steer(

@@ -59,7 +59,9 @@ class Worker:
         self.job, self._libsumo, self._caller = job, libsumo, caller
         layout, law = job.layout, job.law
         self._steering: Steering = (
-            Follower(job, libsumo) if job.cruise is None else Cruiser(job, libsumo, job.cruise)
+            Follower(job, libsumo, self._located)
+            if job.cruise is None
+            else Cruiser(job, libsumo, self._located, job.cruise)
         )
         self._limits = limits(job)
         self._marks = layout.marks.tolist()
@@ -293,6 +295,13 @@ class Worker:
         """`s` of any vehicle on the road [m], watched or not; None while SUMO teleports it."""
         travelled = self._libsumo.vehicle.getDistance(car.name)
         return self._position(car, travelled) if travelled >= 0.0 else None
+
+    def _located(self, car: Car) -> tuple[float, float]:
+        """Where a vehicle on the road is now [m], and its speed [m/s], watched or not."""
+        if car.seen == self._tick:
+            return car.s, car.v
+        s = self._locate(car)
+        return (car.s if s is None else s), self._libsumo.vehicle.getSpeed(car.name)
 
     def _clear(self, car: Car) -> None:
         """Leave a car to SUMO alone: its rear has left the junction."""

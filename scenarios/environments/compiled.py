@@ -46,7 +46,7 @@ def step_all(
     Args:
         floats … lanes: of all worlds, by their first index; see `minisim.engine.packed`.
         trace, bodies, observed: scratch space, as `kernel.advance` takes it.
-        conflicts: which movements conflict, shape (m, m).
+        conflicts: which movements may not go together, shape (m, m); none if not masked.
         actions: which movements may go, shape (worlds, m).
         acts: which worlds act, shape (worlds).
         ask, taken: scratch space, shapes (n) and (m).
@@ -120,7 +120,7 @@ def act(
     ask: Ints,
     taken: Bytes,
 ) -> None:
-    """As `Passing.commands`, if masked; `taken` is used up."""
+    """As `Passing.commands`; `taken` is used up."""
     n = len(lanes)
     for _ in range(n):
         best = -1

@@ -12,8 +12,7 @@ import numpy.typing as npt
 from gymnasium import spaces
 
 from minisim.control import Plan, View
-from minisim.errors import choice
-from scenarios.environments.world import World
+from scenarios.environments.world import PICTURES, World, allowed
 from scenarios.scenario import Scenario
 
 Observation = npt.NDArray[np.float32]
@@ -31,16 +30,11 @@ class Environment(gymnasium.Env[Observation, Any]):
     terminated by a collision, which `info["collision"]` tells, and when every vehicle has arrived.
     """
 
-    metadata: dict[str, Any] = {  # noqa: RUF012  (as in Env)
-        "render_modes": ["rgb_array", "human"], "render_fps": 5,
-    }  # fmt: skip
+    metadata: dict[str, Any] = PICTURES
 
     def __init__(self, scenario: Scenario | None, interval: float, render_mode: str | None) -> None:
-        self.world = World(scenario, interval)
-        if render_mode is not None:
-            choice("render_mode", render_mode, self.metadata["render_modes"])
+        self.world = World(scenario, interval, render_mode)
         self.render_mode = render_mode
-        self._screen: Any = None
 
     @property
     @abstractmethod
@@ -52,16 +46,12 @@ class Environment(gymnasium.Env[Observation, Any]):
         """Begin an episode."""
 
     @abstractmethod
-    def _act(self, action: Any) -> None:
+    def _act(self, action: npt.NDArray[Any]) -> None:
         """Carry out an action, and advance to the next one."""
 
     @abstractmethod
-    def _observe(self, view: View) -> Observation:
-        """What the agent sees."""
-
-    @abstractmethod
-    def _mask(self, view: View) -> npt.NDArray[np.int8]:
-        """Which actions have an effect now."""
+    def _look(self, view: View) -> tuple[Observation, npt.NDArray[np.int8]]:
+        """What the agent sees, and which actions have an effect now."""
 
     def reset(
         self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
@@ -70,46 +60,42 @@ class Environment(gymnasium.Env[Observation, Any]):
         super().reset(seed=seed, options=dict(options or {}))
         self.world.begin(self.plan, int(self.np_random.integers(SEEDS)))
         self._start()
-        view = self.world.sim.view()
-        return self._observe(view), self._info(view)
+        self.world.show()
+        return self._seen(self.world.sim.view())
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Act, and go on to the next action."""
+        """Act, and go on to the next action.
+
+        Raises:
+            InputError: the action is not in `action_space`, or no episode is going on.
+        """
         world = self.world
+        world.check_going()
         before = world.sim.time
-        self._act(action)
+        self._act(allowed(self.action_space, action))
         view = world.sim.view()
         reward = -world.present(view) * (world.sim.time - before)
         crashed = world.collision is not None
-        over = world.sim.finished
-        truncated = over and not crashed and world.sim.time >= world.scenario.horizon
-        if self.render_mode == "human":
-            self.render()
-        info = self._info(view)
-        return self._observe(view), reward, crashed or (over and not truncated), truncated, info
+        truncated = world.over and not crashed and world.sim.time >= world.scenario.horizon
+        world.show()
+        seen, info = self._seen(view)
+        return seen, reward, world.over and not truncated, truncated, info
 
-    def _info(self, view: View) -> dict[str, Any]:
-        info: dict[str, Any] = {"time": view.time, "action_mask": self._mask(view)}
+    def _seen(self, view: View) -> tuple[Observation, dict[str, Any]]:
+        """An observation and its information."""
+        seen, mask = self._look(view)
+        info: dict[str, Any] = {"time": view.time, "action_mask": mask}
         if self.world.collision is not None:
             info["collision"] = str(self.world.collision)
-        return info
+        return seen, info
 
     def render(self) -> npt.NDArray[np.uint8] | None:
         """The junction now: as pixels, or in a window."""
-        from figures.film.live import Live
-
-        if self.render_mode is None:
-            return None
-        if self._screen is None:
-            self._screen = Live(self.world.site, self.plan, window=self.render_mode == "human")
-        pixels: npt.NDArray[np.uint8] = self._screen.draw(self.world.sim.view())
-        return pixels if self.render_mode == "rgb_array" else None
+        return self.world.render()
 
     def close(self) -> None:
         """Close the window."""
-        if self._screen is not None:
-            self._screen.close()
-            self._screen = None
+        self.world.close()
 
 
 def box(size: int) -> Any:

@@ -114,6 +114,7 @@ class LearntSession:
     def decide(self, view: View) -> Sequence[Command]:
         """Look, wish, and give the right of way as far as that is safe."""
         site, passing = self._site, self._passing
-        seen = observed(view, passing, site, self._learnt.sight)
+        junction = passing.look(view)
+        seen = observed(view, junction, site, self._learnt.sight)
         wished: Any = wishes(self._weights, seen[None], site.conflicts)[0]
-        return passing.commands(passing.look(view), lambda v: bool(wished[passing.movement(v)]))
+        return passing.commands(junction, lambda v: bool(wished[passing.movement(v)]))

@@ -6,6 +6,9 @@ from collections.abc import Callable, Iterator
 from itertools import groupby, takewhile
 from typing import NamedTuple
 
+import numpy as np
+import numpy.typing as npt
+
 from baselines.signals.heads import committed
 from minisim.control import Command, Go, Hold, Observed, Site, View, can_stop
 
@@ -15,6 +18,11 @@ class Junction(NamedTuple):
 
     settled: list[Observed]  #: inside, or with the right of way and too close to stop for it
     asking: list[Observed]  #: the first of each lane that can still be held
+
+
+def heeded(site: Site, *, masked: bool) -> npt.NDArray[np.bool_]:
+    """Which movements may not go together, shape (m, m): those in conflict; none if not masked."""
+    return site.conflicts if masked else np.zeros_like(site.conflicts)
 
 
 class Passing:
@@ -28,11 +36,13 @@ class Passing:
 
     def __init__(self, site: Site, sight: float, *, masked: bool) -> None:
         self._rows = site.intersection.movements.rows
-        self._conflicts: list[list[bool]] = site.conflicts.tolist()
-        brakes = [it.deceleration for it in site.types]
-        self._stops: Callable[[Observed], bool] = lambda v: can_stop(v, brakes[v.type])
-        self._sight, self._masked = sight, masked
+        self._conflicts: list[list[bool]] = heeded(site, masked=masked).tolist()
+        self._brakes = [it.deceleration for it in site.types]
+        self._sight = sight
         self._going: set[int] = set()
+
+    def _stops(self, vehicle: Observed) -> bool:
+        return can_stop(vehicle, self._brakes[vehicle.type])
 
     def movement(self, vehicle: Observed) -> int:
         """Index of a vehicle's movement."""
@@ -60,7 +70,7 @@ class Passing:
             yield list(lane)
 
     def possible(self, vehicle: Observed, settled: list[Observed]) -> bool:
-        """Whether a vehicle may go without conflict with those that are settled."""
+        """Whether a vehicle may go: without conflict with those that are settled, if masked."""
         conflicts = self._conflicts[self.movement(vehicle)]
         return not any(conflicts[self.movement(other)] for other in settled)
 
@@ -68,8 +78,7 @@ class Passing:
         """Give the right of way to those that ask and are wished to go; take it from the others."""
         chosen: list[Observed] = []
         for vehicle in sorted(junction.asking, key=lambda v: (v.demand_time, v.lane)):
-            taken = junction.settled + chosen if self._masked else []
-            if wished(vehicle) and self.possible(vehicle, taken):
+            if wished(vehicle) and self.possible(vehicle, junction.settled + chosen):
                 chosen.append(vehicle)
         go = {v.id for v in chosen}
         asking = {v.id for v in junction.asking}

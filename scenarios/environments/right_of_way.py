@@ -11,7 +11,7 @@ from gymnasium import spaces
 from minisim.control import HALTING, Plan, Site, View
 from minisim.errors import instance, number
 from scenarios.environments.environment import Environment, Observation, box
-from scenarios.environments.passing import Passing
+from scenarios.environments.passing import Junction, Passing
 from scenarios.scenario import Scenario
 
 #: What counts as far, long and many, where an observation is 1 [m], [s], vehicles.
@@ -71,31 +71,26 @@ class RightOfWayEnv(Environment):
     def _start(self) -> None:
         self._passing = Passing(self.world.site, self._sight, masked=self._masked)
 
-    def _act(self, action: Any) -> None:
-        world, chosen = self.world, np.asarray(action).tolist()
-        junction = self._passing.look(world.sim.view())
-        wished = self._passing.commands(junction, lambda v: chosen[self._passing.movement(v)])
+    def _act(self, action: npt.NDArray[Any]) -> None:
+        world, passing, chosen = self.world, self._passing, action.tolist()
+        wished = passing.commands(self._junction, lambda v: bool(chosen[passing.movement(v)]))
         world.sim.command(*wished)
         world.sim.run_until("collision", before=world.next_action)
 
-    def _observe(self, view: View) -> Observation:
-        return observed(view, self._passing, self.world.site, self._sight)
-
-    def _mask(self, view: View) -> npt.NDArray[np.int8]:
-        mask = np.zeros(self._m, np.int8)
-        junction = self._passing.look(view)
+    def _look(self, view: View) -> tuple[Observation, npt.NDArray[np.int8]]:
+        passing, mask = self._passing, np.zeros(self._m, np.int8)
+        junction = self._junction = passing.look(view)
         for v in junction.asking:
-            if not self._masked or self._passing.possible(v, junction.settled):
-                mask[self._passing.movement(v)] = 1
-        return mask
+            mask[passing.movement(v)] = passing.possible(v, junction.settled)
+        return observed(view, junction, self.world.site, self._sight), mask
 
 
-def observed(view: View, passing: Passing, site: Site, sight: float) -> Observation:
+def observed(view: View, junction: Junction, site: Site, sight: float) -> Observation:
     """What the agent of `RightOfWayEnv` sees of a view that shows the whole road."""
     n, m = site.intersection.n, len(site.intersection.movements)
     width = 5 + m // n
     seen = np.zeros(n * width + m, np.float32)
-    junction = passing.look(view)
+    rows = site.intersection.movements.rows
     for v in junction.asking:
         at = v.lane * width
         waited = (view.time - v.demand_time) / LONG
@@ -105,5 +100,5 @@ def observed(view: View, passing: Passing, site: Site, sight: float) -> Observat
         if v.speed <= HALTING and v.distance >= 0.0:
             seen[v.lane * width + width - 1] += 1.0 / MANY
     for v in junction.settled:
-        seen[n * width + passing.movement(v)] = 1.0
+        seen[n * width + rows[v.lane][v.manoeuvre]] = 1.0
     return np.minimum(seen, 1.0)

@@ -121,14 +121,20 @@ class SignalEnv(Environment):
         sim = self.world.sim
         sim.command(*self._session.decide(sim.view()))
 
-    def _act(self, action: Any) -> None:
+    def _act(self, action: npt.NDArray[Any]) -> None:
         sim, end = self.world.sim, self.world.next_action
         self._session.chosen = int(action)
         self._decide()
         while sim.run_until("wake", before=end) and not self.world.collision:
             self._decide()
 
-    def _observe(self, view: View) -> Observation:
+    def _look(self, view: View) -> tuple[Observation, npt.NDArray[np.int8]]:
+        mask = np.zeros(self._p, np.int8)
+        mask[:] = self._session.may_change(view.time)
+        mask[self._session.shown] = 1
+        return self._observed(view), mask
+
+    def _observed(self, view: View) -> Observation:
         seen = np.zeros(self._p + 1 + 2 * self._n, np.float32)
         seen[self._session.shown] = 1.0
         seen[self._p] = self._session.may_change(view.time)
@@ -138,9 +144,3 @@ class SignalEnv(Environment):
                 if v.speed <= HALTING:
                     seen[self._p + 1 + self._n + v.lane] += 1.0 / self._capacity
         return np.minimum(seen, 1.0)
-
-    def _mask(self, view: View) -> npt.NDArray[np.int8]:
-        mask = np.zeros(self._p, np.int8)
-        mask[:] = self._session.may_change(view.time)
-        mask[self._session.shown] = 1
-        return mask

@@ -15,10 +15,10 @@ from pettingzoo import ParallelEnv
 from dim import Dim
 from dim.perception import ROUNDING
 from minisim.control import Observed, View
-from minisim.errors import choice, instance, number
+from minisim.errors import InputError, instance, number, show
 from scenarios.environments.environment import SEEDS, Observation, box
 from scenarios.environments.passing import Passing
-from scenarios.environments.world import World
+from scenarios.environments.world import PICTURES, World, allowed
 from scenarios.scenario import Scenario
 
 #: How much of the roads a picture shows [m].
@@ -60,8 +60,7 @@ class VehiclesEnv(ParallelEnv[str, Observation, int]):  # type: ignore[misc]  # 
     """
 
     metadata: ClassVar[dict[str, Any]] = {
-        "name": "minisim_vehicles_v0", "render_modes": ["rgb_array", "human"], "render_fps": 5,
-        "is_parallelizable": True,
+        **PICTURES, "name": "minisim_vehicles_v0", "is_parallelizable": True,
     }  # fmt: skip
 
     def __init__(
@@ -74,12 +73,9 @@ class VehiclesEnv(ParallelEnv[str, Observation, int]):  # type: ignore[misc]  # 
         render_mode: str | None = None,
     ) -> None:
         instance("masked", masked, bool)
-        self.world = World(scenario, interval)
+        self.world = World(scenario, interval, render_mode)
         self._masked, self._crash = masked, number("crash [s]", crash, above=0, high=1e6)
-        if render_mode is not None:
-            choice("render_mode", render_mode, self.metadata["render_modes"])
         self.render_mode = render_mode
-        self._screen: Any = None
         self._n = self.world.site.intersection.n
         self._turns = self._n - 1
         dim = Dim()
@@ -118,6 +114,7 @@ class VehiclesEnv(ParallelEnv[str, Observation, int]):  # type: ignore[misc]  # 
         self._vehicles = len(world.sim.arrivals)
         self._passing = Passing(site, self._zone, masked=self._masked)
         view = self._wait()
+        world.show()
         self.agents = [NAME.format(v.id) for v in view.vehicles]
         return self._look(view)
 
@@ -127,11 +124,15 @@ class VehiclesEnv(ParallelEnv[str, Observation, int]):  # type: ignore[misc]  # 
         dict[str, Observation], dict[str, float], dict[str, bool], dict[str, bool],
         dict[str, dict[str, Any]],
     ]:  # fmt: skip
-        """Act, and go on until the next action, or until an agent is there."""
-        world, began, before = self.world, self.world.sim.time, self.agents
-        junction = self._passing.look(self._near())
-        go = {agent for agent, action in actions.items() if action}
-        wished = self._passing.commands(junction, lambda v: NAME.format(v.id) in go)
+        """Act, and go on until the next action, or until an agent is there.
+
+        Raises:
+            InputError: there is not one action of its space for each agent, or no episode goes on.
+        """
+        world, before = self.world, self.agents
+        go = self._going(actions)
+        began = world.sim.time
+        wished = self._passing.commands(self._junction, lambda v: NAME.format(v.id) in go)
         world.sim.command(*wished)
         world.sim.run_until("collision", before=world.next_action)
         spent = world.sim.time - began
@@ -157,9 +158,23 @@ class VehiclesEnv(ParallelEnv[str, Observation, int]):  # type: ignore[misc]  # 
             for info in infos.values():
                 info["collision"] = str(crash)
         self.agents = [a for a in rewards if not (terminated[a] or truncated[a])]
-        if self.render_mode == "human":
-            self.render()
+        world.show()
         return observations, rewards, terminated, truncated, infos
+
+    def _going(self, actions: Mapping[str, int]) -> set[str]:
+        """The agents that want to go; raises `InputError` as `step` does."""
+        self.world.check_going()
+        instance("actions", actions, Mapping)
+        if missing := [agent for agent in self.agents if agent not in actions]:
+            raise InputError(f"each agent needs an action, and {missing[0]} has none")
+        if unknown := [agent for agent in actions if agent not in self.agents]:
+            raise InputError(
+                f"{show(unknown[0])} is no agent now; allowed: {', '.join(self.agents)}"
+            )
+        return {
+            agent for agent, action in actions.items()
+            if allowed(self._actions, action, f"the action of {agent}")
+        }  # fmt: skip
 
     def _near(self) -> View:
         """The vehicles that are agents now."""
@@ -176,7 +191,7 @@ class VehiclesEnv(ParallelEnv[str, Observation, int]):  # type: ignore[misc]  # 
 
     def _look(self, view: View) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
         """What each agent sees, and what it may do."""
-        junction = self._passing.look(view)
+        junction = self._junction = self._passing.look(view)
         first = np.zeros((self._n, 3 + self._turns), np.float32)
         settled = np.zeros((self._n, self._turns), np.float32)
         asked = {v.id for v in junction.asking}
@@ -204,23 +219,13 @@ class VehiclesEnv(ParallelEnv[str, Observation, int]):  # type: ignore[misc]  # 
     ) -> npt.NDArray[np.int8]:
         if v.id in sure:
             return np.array([0, 1], np.int8)
-        may = v.id in asked and (not self._masked or self._passing.possible(v, settled))
+        may = v.id in asked and self._passing.possible(v, settled)
         return np.array([1, may], np.int8)
 
     def render(self) -> npt.NDArray[np.uint8] | None:
         """The junction now: as pixels, or in a window."""
-        from figures.film.live import Live
-
-        if self.render_mode is None:
-            return None
-        if self._screen is None:
-            window = self.render_mode == "human"
-            self._screen = Live(self.world.site, self.plan, window=window)
-        pixels: npt.NDArray[np.uint8] = self._screen.draw(self.world.sim.view())
-        return pixels if self.render_mode == "rgb_array" else None
+        return self.world.render()
 
     def close(self) -> None:
         """Close the window."""
-        if self._screen is not None:
-            self._screen.close()
-            self._screen = None
+        self.world.close()

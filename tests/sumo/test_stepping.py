@@ -7,6 +7,7 @@ import os
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -81,6 +82,28 @@ def test_a_command_acts_from_its_time_on(
         trace = sim.run().trace
     before, after = (trace["v"][trace["tick"] == round(20.0 / sim.site.dt) + k] for k in (0, 1))
     assert (after - before) / sim.site.dt == pytest.approx(a, abs=1e-4)
+
+
+@pytest.mark.parametrize("slow", [Advise, Brake])
+def test_who_slows_down_by_command_minds_those_that_have_left(slow: Any) -> None:
+    """Vehicle 0 crawls behind the junction; 1 is told at each step to slow down by a little."""
+    scenario = replayed(four_way(profile=FAIR), (0.0, 0, 2), (3.0, 0, 2), horizon=60.0)
+    gaps = []
+    for host in (ours.Simulation, Simulation):
+        plan = Plan(sight=250.0, lanes_open=True, reach=30.0)
+        with host(scenario, External(plan), record="all") as sim:
+            while not sim.finished:
+                seen = {it.id: it for it in sim.view().vehicles}
+                if 0 in seen and seen[0].distance < -10.0:
+                    sim.command(Advise(0, 0.5))
+                if 1 in seen and seen[1].distance < 5.0:
+                    mild = max(seen[1].speed - 0.05, 0.0) if slow is Advise else 0.1
+                    sim.command(slow(1, mild))
+                sim.advance(sim.time + 0.1)
+            way = sim.result().trajectories.pivot(index="time_s", columns="vehicle", values="s_m")
+        gaps.append(float((way[0] - way[1]).min()) - scenario.profile.vehicle.length)
+    assert min(gaps) > 1.0
+    assert gaps[0] == pytest.approx(gaps[1], abs=0.5)
 
 
 def test_outside_and_inside_are_the_same() -> None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
+import pickle
 import subprocess
 import sys
 from typing import Any
@@ -52,6 +54,7 @@ def episode(env: Any, seed: int, steps: int = 10**6) -> tuple[list[float], dict[
     return rewards, info
 
 
+@pytest.mark.filterwarnings("ignore:no window")  # it also makes one that shows a window
 @pytest.mark.parametrize("name", NAMES)
 def test_gymnasiums_checks(name: str) -> None:
     check_env(gymnasium.make(name, scenario=short(30.0), render_mode="rgb_array").unwrapped)
@@ -287,6 +290,87 @@ def test_pictures(make: str) -> None:
     env.close()
 
 
+def test_a_window_without_a_display_warns(monkeypatch: pytest.MonkeyPatch) -> None:
+    from matplotlib import pyplot
+
+    monkeypatch.setattr(pyplot, "get_backend", lambda: "agg")
+    env = environments.SignalEnv(short(30.0), render_mode="human")
+    with pytest.warns(UserWarning, match="no window: matplotlib finds no display here"):
+        env.reset(seed=0)
+    env.step(0)
+    assert env.render() is None
+    env.close()
+
+
+NOTHING = np.zeros(12, np.int8)
+
+
+@pytest.mark.parametrize("make", ["RightOfWayEnv", "SignalEnv", "VehiclesEnv", "RightOfWayBatch"])
+def test_what_has_not_begun_or_is_over_cannot_go_on(make: str) -> None:
+    scenario = short(20.0, density=600.0)
+    many = make == "RightOfWayBatch"
+    env = (
+        environments.RightOfWayBatch(1, scenario) if many else getattr(environments, make)(scenario)
+    )
+    nothing = {"SignalEnv": 0, "VehiclesEnv": {}, "RightOfWayBatch": NOTHING[None]}
+    with pytest.raises(InputError, match=r"there is no run yet: call reset\(\) first"):
+        env.step(nothing.get(make, NOTHING))
+    if many:  # it begins again by itself
+        return
+    env.reset(seed=1)
+    env.world.sim.advance(20.0)
+    with pytest.raises(InputError, match=r"the episode ended at 20 s: call reset\(\) first"):
+        env.step(nothing.get(make, NOTHING))
+
+
+def test_after_a_collision_nothing_goes_on() -> None:
+    env = environments.RightOfWayEnv(short(600.0, density=350.0), masked=False)
+    _, info = episode(env, 0)
+    with pytest.raises(InputError, match="the episode ended"):
+        env.step(NOTHING)
+    assert "collision" in info
+
+
+@pytest.mark.parametrize(
+    ("make", "actions"),
+    [
+        ("RightOfWayEnv", [NOTHING[:3], 5, None, "go", NOTHING + 2, NOTHING[None], [[1], [1, 2]]]),
+        ("SignalEnv", [4, -1, None, "x", 1.5, [1]]),
+        ("RightOfWayBatch", [NOTHING, np.zeros((2, 12)), np.zeros((1, 3)), np.full((1, 12), 0.5)]),
+        ("VehiclesEnv", [None, [1], {}, {"vehicle_0": 2}, {"vehicle_0": 1, "vehicle_99": 1}]),
+    ],
+)
+def test_wrong_actions_are_told(make: str, actions: list[Any]) -> None:
+    scenario = short(60.0, density=600.0)
+    env = getattr(environments, make)(scenario=scenario)
+    env.reset(seed=1)
+    for action in actions:
+        with pytest.raises(InputError, match=r"must be|needs an action|is no agent now"):
+            env.step(action)
+
+
+@pytest.mark.parametrize("make", ["RightOfWayEnv", "VehiclesEnv"])
+def test_an_environment_can_be_kept_and_copied(make: str) -> None:
+    """As a pickle and by deepcopy, in the middle of an episode."""
+    env = getattr(environments, make)(short(60.0, density=500.0))
+    env.reset(seed=3)
+
+    def on(it: Any, steps: int) -> list[float]:
+        return [
+            total(it.step(dict.fromkeys(it.agents, 1) if it.metadata.get("name") else NOTHING + 1))
+            for _ in range(steps)
+        ]
+
+    def total(made: Any) -> float:
+        return float(sum(made[1].values()) if isinstance(made[1], dict) else made[1])
+
+    on(env, 20)
+    twins = copy.deepcopy(env), pickle.loads(pickle.dumps(env))
+    kept = on(env, 15)
+    assert sum(kept) < 0.0
+    assert [on(it, 15) for it in twins] == [kept, kept]
+
+
 def test_horizons_truncate_and_empty_roads_terminate() -> None:
     quiet = dataclasses.replace(short(600.0, density=100.0), demand_time=30.0)
     env = environments.RightOfWayEnv(quiet)
@@ -304,13 +388,18 @@ def test_without_the_extra_it_says_what_to_install() -> None:
     assert "environments need pettingzoo: pip install 'minisim-traffic[gym]'" in done.stderr
 
 
-@pytest.mark.parametrize("make", [three_way, four_way, five_way])
-def test_a_batch_is_as_many_single_ones(make: Any) -> None:
-    """Also when episodes end and begin again, each at its own time."""
+@pytest.mark.parametrize(
+    ("make", "masked"), [(three_way, True), (four_way, True), (four_way, False), (five_way, True)]
+)
+def test_a_batch_is_as_many_single_ones(make: Any, masked: bool) -> None:
+    """Also when episodes end and begin again, each at its own time; with collisions if unmasked."""
     scenario = dataclasses.replace(make(density=400.0, horizon=90.0, warmup=0.0), demand_time=20.0)
-    batch = gymnasium.make_vec("minisim/RightOfWay-v0", num_envs=3, scenario=scenario)
+    batch = gymnasium.make_vec(
+        "minisim/RightOfWay-v0", num_envs=3, scenario=scenario, masked=masked
+    )
     assert isinstance(batch, environments.RightOfWayBatch)
-    single = [environments.RightOfWayEnv(scenario) for _ in range(3)]
+    single = [environments.RightOfWayEnv(scenario, masked=masked) for _ in range(3)]
+    crashed = False
     seen, _ = batch.reset(seed=5)
     for k, env in enumerate(single):
         assert seen[k] == pytest.approx(env.reset(seed=5 + k)[0], abs=1e-6)
@@ -329,17 +418,43 @@ def test_a_batch_is_as_many_single_ones(make: Any) -> None:
             assert (terminated[k], truncated[k]) == own[2:4]
             assert info["time"][k] == own[4]["time"]
             assert np.array_equal(info["action_mask"][k], own[4]["action_mask"])
+            told = info["collision"][k] if info.get("_collision", [False] * 3)[k] else None
+            assert told == own[4].get("collision")
+            crashed |= told is not None
             begins[k] = own[2] or own[3]
             episodes += begins[k]
     assert episodes >= 3
+    assert crashed != masked
 
 
 def test_a_batch_of_none_and_seeds_of_each() -> None:
     with pytest.raises(InputError, match="num_envs must be an integer 1"):
         environments.RightOfWayBatch(0)
     batch = environments.RightOfWayBatch(2, short(100.0, density=600.0))
+    with pytest.raises(InputError, match="2 junctions need as many seeds, got 3"):
+        batch.reset(seed=[7, 7, 7])
     batch.reset(seed=[7, 7])
     for _ in range(60):
         seen, *_ = batch.step(np.ones((2, 12), np.int8))
     assert np.array_equal(seen[0], seen[1])
     assert seen[0].any()
+
+
+def test_a_batch_goes_on_with_its_random_numbers() -> None:
+    """As Gymnasium wants it: a reset without a seed is none with a new one."""
+    kept = []
+    for _ in range(2):
+        batch = environments.RightOfWayBatch(3, short(60.0, density=600.0))
+        batch.reset(seed=4)
+        first = batch.vehicles.tolist()
+        batch.reset()
+        kept.append((first, batch.vehicles.tolist()))
+    assert kept[0] == kept[1]
+    assert kept[0][0] != kept[0][1]
+
+
+@pytest.mark.parametrize("profile", ["as_run", "as_run_signals"])
+def test_a_batch_of_vehicles_that_it_cannot_drive(profile: str) -> None:
+    scenario = four_way(density=300.0, horizon=60.0, warmup=0.0, profile=profile)
+    with pytest.raises(InputError, match=f"vehicles of the profile {profile}, which follow SUMO"):
+        environments.RightOfWayBatch(2, scenario)
