@@ -17,11 +17,13 @@ from collections.abc import Callable, Hashable, Sequence
 from functools import lru_cache
 from importlib import import_module
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import Any, TypeAlias, TypeVar, cast
 
+from minisim.apart import elsewhere, wait_for
 from minisim.compiling import announce, switched_off
 
-_F = TypeVar("_F", bound=Callable[..., object])
+_Function: TypeAlias = Callable[..., object]
+_F = TypeVar("_F", bound=_Function)
 
 
 def _enabled() -> bool:
@@ -45,6 +47,24 @@ def njit(function: _F) -> _F:
     than the arithmetic.
     """
     return _compile(function)
+
+
+def njit_with(*apart: _Function) -> Callable[[_F], _F]:
+    """`njit` for a function with large parts, which are `njit_apart`, in the order of their calls.
+
+    Where there is a second core, a second process compiles them meanwhile. The function hands its
+    arguments on to them under the same names.
+    """
+
+    def decorate(function: _F) -> _F:
+        return _compile(function, apart)
+
+    return decorate
+
+
+def njit_apart(function: _F) -> _F:
+    """`njit_inline` for a part of `njit_with`, which is compiled and cached by itself."""
+    return _compile(function, forceinline=True)
 
 
 def njit_inner(function: _F) -> _F:
@@ -156,7 +176,7 @@ def _inner_classes() -> tuple[type, type]:
     return Parts, Inner
 
 
-def _compile(function: _F, **options: object) -> _F:
+def _compile(function: _F, apart: Sequence[_Function] = (), **options: object) -> _F:
     if not COMPILED:
         return function
     import numba
@@ -166,7 +186,7 @@ def _compile(function: _F, **options: object) -> _F:
     chosen: dict[str, Any] = {**_OPTIONS, **options}
     compiled: Any = numba.njit(**chosen)(function)
     compiled.__class__ = _outer_class()
-    compiled._cache = _cache_class()(function)  # what `cache=True` does, with our class
+    compiled._cache = _cache_class()(function, apart)  # what `cache=True` does, with our class
     return cast(_F, compiled)
 
 
@@ -183,10 +203,12 @@ def _outer_class() -> type:
         """A function that Python calls."""
 
         def compile(self, sig: Any) -> Any:
+            own: Any = self
             collects = gc.isenabled()
             gc.disable()
             try:
-                return super().compile(sig)
+                with elsewhere() as own._cache.begin:
+                    return super().compile(sig)
             finally:
                 if collects:
                     gc.enable()
@@ -262,8 +284,10 @@ def _cache_class() -> Any:
     class SourcesCache(FunctionCache):
         """numba's cache on disk, valid only as long as none of our sources changes."""
 
-        def __init__(self, function: Callable[..., object]) -> None:
+        def __init__(self, function: _Function, apart: Sequence[_Function]) -> None:
             super().__init__(function)  # type: ignore[no-untyped-call]  # numba has no types
+            self._apart, self._parameters = apart, list(inspect.signature(function).parameters)
+            self.begin: Callable[[Sequence[tuple[_Function, Any]]], None] = lambda _: None
             folder = Path(inspect.getfile(function)).parent
             sources = numba.__version__, _digest(folder), _digest(Path(__file__).parent)
             make: Any = Files
@@ -276,11 +300,17 @@ def _cache_class() -> Any:
             # numba's would first load what only its compiler needs, all of scipy.linalg included.
             rtsys.initialize(target_context)  # for code that makes arrays
             own: Any = self
+            wait_for(own._py_func)
             with own._guard_against_spurious_io_errors():
                 found = own._load_overload(sig, target_context)
             if found is None:
                 announce()
+                self.begin([(part, self._types(part, sig)) for part in self._apart])
             return found
+
+        def _types(self, part: _Function, sig: Sequence[Any]) -> tuple[Any, ...]:
+            types = dict(zip(self._parameters, sig, strict=True))
+            return tuple(types[name] for name in inspect.signature(part).parameters)
 
     return SourcesCache
 

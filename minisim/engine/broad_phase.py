@@ -6,7 +6,7 @@ import math
 
 from minisim.engine.packed import AWAY, LENGTH, PATH, TYPE, S, count
 from minisim.engine.state import Floats, Ints, Layout, Records
-from minisim.jit import njit_inline, njit_inner
+from minisim.jit import njit_apart, njit_inline, njit_inner
 from minisim.junction.paths import dragged, locate
 from minisim.laws import Law
 
@@ -17,7 +17,7 @@ TOUCH_MARGIN = 0.02
 place, drag = njit_inline(locate), njit_inline(dragged)
 
 
-@njit_inner
+@njit_apart
 def may_touch(
     floats: Floats, ints: Ints, lanes: Records, layout: Layout, law: Law, bodies: Floats
 ) -> bool:

@@ -47,7 +47,7 @@ from minisim.engine.packed import (
     padded,
 )
 from minisim.engine.state import Floats, Ints, Layout, Records
-from minisim.jit import njit_inline, njit_inner
+from minisim.jit import njit_apart, njit_inline, njit_inner
 from minisim.laws import (
     IDM,
     IIDM,
@@ -75,7 +75,7 @@ def accelerate(
     for lane in range(len(lanes)):
         overlap |= near_junction(floats, ints, lanes, layout, law, lane)
     overlap |= weigh(floats, ints, layout, law, n)
-    choose(floats, ints, vehicles, lanes, layout, law, n)
+    choose(floats, ints, vehicles, lanes, layout, law)
     keep_rooms(floats, ints, layout, law, n)
     limit(floats, n, braking)
     return overlap
@@ -204,12 +204,12 @@ def weigh(floats: Floats, ints: Ints, layout: Layout, law: Law, n: int) -> bool:
     return overlap
 
 
-@njit_inline
+@njit_apart
 def choose(
-    floats: Floats, ints: Ints, vehicles: Records, lanes: Records, layout: Layout, law: Law, n: int
+    floats: Floats, ints: Ints, vehicles: Records, lanes: Records, layout: Layout, law: Law
 ) -> None:
     """The acceleration that the law, the limits and the hold line allow."""
-    flag = floats[FLAG]
+    n, flag = count(lanes), floats[FLAG]
     if law.model == IDM and law.quartic:
         s, v, acc, ratio, z = floats[S], floats[V], floats[ACC], floats[RATIO], floats[CLOSENESS]
         a, b, top = floats[A], floats[B], floats[LIMIT]

@@ -11,7 +11,7 @@ from minisim.engine.broad_phase import may_touch
 from minisim.engine.cruise.ends import look
 from minisim.engine.cruise.law import Cruise
 from minisim.engine.cruise.step import accelerate as accelerate_cruising
-from minisim.engine.following import accelerate
+from minisim.engine.following import accelerate, choose
 from minisim.engine.insertion import insert
 from minisim.engine.moving import CLEAR, MARKED, catch_up, move
 from minisim.engine.packed import (
@@ -29,14 +29,14 @@ from minisim.engine.packed import (
     store,
 )
 from minisim.engine.state import ARRIVED, Floats, Ints, Layout, Records
-from minisim.jit import njit, njit_inline, njit_inner
+from minisim.jit import njit_inline, njit_inner, njit_with
 from minisim.laws import Law
 
 #: Reasons to return, as bits, beside those to wake a session.
 TOUCH, GAP, TRACE_FULL, DONE = 4, 8, 16, 32
 
 
-@njit
+@njit_with(choose, move, may_touch)
 def advance(
     floats: Floats,
     ints: Ints,

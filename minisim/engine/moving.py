@@ -31,14 +31,14 @@ from minisim.engine.packed import (
     padded,
 )
 from minisim.engine.state import ARRIVED, Floats, Ints, Layout, Records
-from minisim.jit import njit_inline, njit_inner
+from minisim.jit import njit_apart, njit_inline, njit_inner
 from minisim.laws import Law
 
 #: Reasons to wake a session, as bits.
 MARKED, CLEAR = 1, 2
 
 
-@njit_inline
+@njit_apart
 def move(
     floats: Floats,
     ints: Ints,

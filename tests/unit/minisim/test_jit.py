@@ -15,6 +15,7 @@ from subprocess import PIPE
 import pytest
 
 import minisim.jit
+from minisim import apart
 from minisim.jit import _digest
 from tests.builders import python
 
@@ -95,7 +96,7 @@ def copied(folder: Path) -> Path:
     (folder / "outside").mkdir()
     for package in ("minisim", "outside"):
         (folder / package / "__init__.py").write_text("")
-    for name in ("compiling.py", "jit.py"):
+    for name in ("apart.py", "compiling.py", "jit.py"):
         shutil.copy(source / name, folder / "minisim" / name)
     (folder / "outside" / "caller.py").write_text(CALLER)
     return folder
@@ -260,6 +261,51 @@ def test_code_of_old_sources_does_not_stay(tmp_path: Path, ask: Ask) -> None:
         write(tree, factor=factor)
         assert ask(tree) == f"{10.0 + factor} compiled"
     assert len(list((tmp_path / "kept").rglob("caller.answer-*.nbc"))) == 1
+
+
+#: Who has compiled `rule`: this process, or another.
+WITH_PARTS = """
+from minisim.jit import njit_with
+from outside.rule import rule
+
+@njit_with(rule)
+def answer(x: float) -> float:
+    return rule(x) + 0.5
+"""
+
+ASK_WITH_PARTS = """
+from outside.caller import answer
+from outside.rule import rule
+print(answer(10.0), rule(2.0), "kept" if rule.stats.cache_hits else "compiled")
+"""
+
+FAILURES = {
+    "one core": "import minisim.apart; minisim.apart.cores = lambda: 1\n",
+    "no interpreter": "import sys; sys.executable = None\n",
+    "another process that fails": "import sys; sys.executable = '/bin/false'\n",
+    "another process that is never there": "import sys; sys.executable = '/no/python'\n",
+}
+
+
+def with_parts(folder: Path) -> Path:
+    tree = copied(folder)
+    write(tree, decorator="njit_apart", body="x * 2.0")
+    (tree / "outside" / "caller.py").write_text(WITH_PARTS)
+    return tree
+
+
+@pytest.mark.skipif(apart.cores() == 1, reason="there is no second core for a second process")
+def test_a_second_process_compiles_parts(tmp_path: Path, ask: Ask) -> None:
+    assert ask(with_parts(tmp_path), ASK_WITH_PARTS) == "20.5 4.0 kept"
+
+
+@pytest.mark.parametrize("failure", FAILURES.values(), ids=FAILURES)
+def test_without_a_second_process_all_is_compiled_here(
+    tmp_path: Path, ask: Ask, failure: str
+) -> None:
+    tree = with_parts(tmp_path)
+    assert ask(tree, failure + ASK_WITH_PARTS) == "20.5 4.0 compiled"
+    assert ask(tree, failure + ASK_WITH_PARTS) == "20.5 4.0 kept"
 
 
 #: A numba without a part that it does not promise.
