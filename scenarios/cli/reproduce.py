@@ -23,7 +23,7 @@ from scenarios.studies import NAMES, study_named
     "[bold]How long[/bold]\n\n"
     "In minutes of processor time, with 10 seeds: text (the "
     "paper's grid, 700 hours, comes first) 2.5; optimum 15; gap 4; gate 0.7; fairness 0.2; "
-    "perception 26 and confidence 3 (at most 5 seeds); messages 17; as-run (step 0.01 s) 25. fair, "
+    "perception 26 and confidence 3 (at most 5 seeds); messages 19; as-run (step 0.01 s) 25. fair, "
     "mixed and capacity (1800, 4500 and 1680 hours) take an hour or more each: slots and platoons "
     "plan for all vehicles in sight, so an hour takes them 0.2 s at 50 veh/h/lane, 2 s at 350 and "
     "20 s once queues fill the roads. Two processes halve the time. For the paper's grid alone: "
