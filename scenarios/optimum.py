@@ -9,7 +9,6 @@ The metrics at the end go wherever metrics do: `--metrics scenarios.optimum:ABOV
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
@@ -19,9 +18,10 @@ import numpy as np
 
 from baselines.optimum.alone import drives
 from baselines.optimum.planning import drivable
+from baselines.optimum.platoons import earliest
 from baselines.optimum.scheduled import BUFFER, Scheduled, Turn
 from baselines.optimum.separations import Needs, alike, necessary
-from baselines.optimum.sequencing import WAKE_STEP, Queue, Schedule, scheduled
+from baselines.optimum.sequencing import Queue, Schedule, scheduled
 from baselines.prediction import Floats
 from minisim.arrivals import Arrivals, ranks
 from minisim.control import Controller, Cover, Session, Site
@@ -101,7 +101,7 @@ class Optimum:
     def _best(self) -> Schedule:
         plan = drivable(self.site, BUFFER, self.depart_speed)
         came, lane = self.arrivals.time, self.arrivals.lane
-        queue = _queue(came, lane, self._kind, plan, self.site.dt)
+        queue = _queue(came, lane, self._kind, plan, self.site, self.depart_speed)
         return scheduled(queue, plan.rules, bounded=False)
 
 
@@ -216,19 +216,18 @@ def _bound(site: Site, depart_speed: float | None, time: bytes, lane: bytes, kin
     """`Optimum.bound`, kept: a process often runs several controllers on the same arrivals."""
     came, kinds = np.frombuffer(time), np.frombuffer(kind, np.int64)
     needs = necessary(site, depart_speed)
-    queue = _queue(came, np.frombuffer(lane, np.int64), kinds, needs, site.dt)
+    queue = _queue(came, np.frombuffer(lane, np.int64), kinds, needs, site, depart_speed)
     least = scheduled(queue, needs.rules).bound - float((came + needs.at_limit[kinds]).sum())
     return max(least, 0.0) / max(len(came), 1)
 
 
-def _queue(came: Floats, lane: Ints, kind: Ints, needs: Needs, dt: float) -> Queue:
-    """The vehicles, by lane; none comes before it would behind the one ahead of it, if alone."""
+def _queue(
+    came: Floats, lane: Ints, kind: Ints, needs: Needs, site: Site, depart_speed: float | None
+) -> Queue:
+    """The vehicles, by lane; none is at its mark before it can be behind those ahead of it."""
     order = np.lexsort((came, lane))
-    enters, lane, kind = (np.ceil(came / dt - 1e-6) * dt)[order], lane[order], kind[order]
-    behind = np.diff(enters, prepend=-math.inf)
-    behind[np.diff(lane, prepend=-1) > 0] = math.inf
-    # A larger time behind only makes the loss smaller.
-    place = np.minimum(np.ceil(behind / WAKE_STEP), needs.approach.shape[1] - 1.0).astype(int)
-    loss = np.where(behind < math.inf, needs.approach[kind, place], 0.0)
+    enters = np.ceil(came[order] / site.dt - 1e-6).astype(np.int64)
+    lane, kind = lane[order], kind[order]
+    ready = earliest(site, enters, lane, kind, needs.marks, depart_speed)
     begins = np.searchsorted(lane, np.arange(lane.max(initial=-1) + 2))
-    return Queue(enters + loss + needs.until[kind], kind, begins)
+    return Queue(ready, kind, begins)

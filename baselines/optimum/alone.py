@@ -31,6 +31,9 @@ class Drive(NamedTuple):
     v: Floats  #: upper bound on its speed there [m/s]
     time: Floats  #: lower bound on the time since the entry [s]; negative before it
     at_limit: float  #: time that the whole way takes at the limits of its roads [s]
+    crossing: float  #: where the junction ends [m]
+    limit: float  #: before the junction [m/s]
+    behind: float  #: and behind it [m/s]
 
     @property
     def before(self) -> float:
@@ -94,7 +97,8 @@ def _drive(law: Law, me: Traits, way: Course, start: float, depart: float | None
     time = np.concatenate([[0.0], np.cumsum(pace)])
     at_limit = -start / way.before + way.crossing / way.turn
     at_limit += (way.end - way.crossing) / way.behind
-    return Drive(s, v, time - time[s.searchsorted(0.0)], at_limit)
+    since = time - time[s.searchsorted(0.0)]
+    return Drive(s, v, since, at_limit, way.crossing, way.before, way.behind)
 
 
 def _rising(law: Law, me: Traits, v: float, limit: float, past: Floats) -> Floats:
