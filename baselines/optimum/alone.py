@@ -89,8 +89,12 @@ def _drive(law: Law, me: Traits, way: Course, start: float, depart: float | None
             v[after] = np.minimum(v[after], _rising(law, me, speed, behind, s[after] - place))
         elif behind < speed:
             # It brakes comfortably for the lower limit. The step in which it gets there may end
-            # past the place, so for a step's way it may still be faster, by b·dt at most.
-            v[~after] = np.minimum(v[~after], np.sqrt(behind**2 + 2.0 * me.b * (place - s[~after])))
+            # past the place, so for a step's way on either side it may still be faster, by b·dt at
+            # most: it slows down evenly in that step.
+            last = behind + me.b * law.dt
+            braking = np.sqrt(behind**2 + 2.0 * me.b * (place - s[~after]))
+            near = s[~after] > place - last * law.dt
+            v[~after] = np.minimum(v[~after], np.maximum(braking, np.where(near, last, 0.0)))
             late = after & (s < place + behind * law.dt)
             v[late] += me.b * law.dt * (1.0 - (s[late] - place) / (behind * law.dt))
     pace = np.diff(s) / np.maximum(v[:-1], v[1:])

@@ -22,7 +22,7 @@ from scenarios.recipe import Recipe
 
 #: Raise it by one when recipes give different rows while the version of the package stays the same.
 #: Stored rows are then computed again.
-RESULTS = 9
+RESULTS = 10
 
 #: Packages whose changes `RESULTS` counts.
 OURS = ("minisim", "dim", "baselines", "scenarios")
