@@ -13,10 +13,10 @@ far it is behind. So none passes a place before its reference does.
 with v (dt·c ≤ 1) and falls with y, so the worst states are those with e = −r·y. Along them F is
 concave in |y|: its free part is, and the ratio z of wanted and actual gap is convex, for it is a
 quadratic over a linear term (`_safe` says when, and takes a larger gap otherwise). A concave
-function is below its tangents, so e' ≤ h·|y| with h = r·(1 − c·dt) + k·dt, where c = −∂F/∂v and k = ∂F/∂gap at the reference. As
-|y'| ≥ |y|·(1 − dt·(r + h)/2), the next cone has r' = h / (1 − dt·(r + h)/2). In continuous time it
-is r' = r² − c·r + k, which stays small where the law damps well (c² > 4k), as the IDM does near
-its limit. On such orders: Hirsch, Smith 2005, Monotone Dynamical Systems (Handbook of Differential
+function is below its tangents, so e' ≤ h·|y| with h = r·(1 − c·dt) + k·dt, where c = −∂F/∂v
+and k = ∂F/∂gap at the reference. As |y'| ≥ |y|·(1 − dt·(r + h)/2), the next cone has
+r' = h / (1 − dt·(r + h)/2). In continuous time it is r' = r² − c·r + k, which stays small
+where the law damps well (c² > 4k), as the IDM does near its limit. On such orders: Hirsch, Smith 2005, Monotone Dynamical Systems (Handbook of Differential
 Equations: ODE 2).
 
 *The vehicle ahead* is in the cone of its own reference, too: up to (u − w)/r further behind at a
