@@ -13,19 +13,19 @@ far it is behind. So none passes a place before its reference does.
 with v (dt·c ≤ 1) and falls with y, so the worst states are those with e = −r·y. Along them F is
 concave in |y|: its free part is, and the ratio z of wanted and actual gap is convex, for it is a
 quadratic over a linear term (`_safe` says when, and takes a larger gap otherwise). A concave
-function is below its tangents, so e' ≤ h·|y| with h = r·(1 − c·dt) + k·dt, where c = −∂F/∂v
-and k = ∂F/∂gap at the reference. As |y'| ≥ |y|·(1 − dt·(r + h)/2), the next cone has
-r' = h / (1 − dt·(r + h)/2). In continuous time it is r' = r² − c·r + k, which stays small
-where the law damps well (c² > 4k), as the IDM does near its limit. On such orders: Hirsch, Smith 2005, Monotone Dynamical Systems (Handbook of Differential
-Equations: ODE 2).
+function is below its tangents, so e' ≤ h·|y| with h = r·(1 − c·dt) + k·dt, where c = −∂F/∂v and k =
+∂F/∂gap at the reference. As |y'| ≥ |y|·(1 − dt·(r + h)/2), the next cone has r' = h / (1 − dt·(r +
+h)/2). In continuous time it is r' = r² − c·r + k, which stays small where the law damps well (c² >
+4k), as the IDM does near its limit. On such orders: Hirsch, Smith 2005, Monotone Dynamical Systems
+(Handbook of Differential Equations: ODE 2).
 
 *The vehicle ahead* is in the cone of its own reference, too: up to (u − w)/r further behind at a
 speed of up to the limit u. The law asks for less behind it than behind the reference as long as
 z ≥ r·v / (2√(ab)). Where that may fail, the law is asked behind both ends of this range, and the
 higher answer counts: z is a linear term over a linear one, so none between them asks for less.
 
-*Where the cone gets too wide* (as with a small gap at a low speed), the reference
-drives on at the limit, which no vehicle exceeds, and starts anew from there.
+*Where the cone gets too wide* (as with a small gap at a low speed), the reference drives on at the
+limit, which no vehicle exceeds, and starts anew from there.
 
 Until it has to slow down for the junction, a vehicle is compared with its reference. From there it
 is as fast as alone (`baselines.optimum.alone`), and so is what those behind it follow.
