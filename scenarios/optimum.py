@@ -9,19 +9,19 @@ The metrics at the end go wherever metrics do: `--metrics scenarios.optimum:ABOV
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from baselines.optimum.alone import drives
 from baselines.optimum.planning import drivable
+from baselines.optimum.platoons import earliest
 from baselines.optimum.scheduled import BUFFER, Scheduled, Turn
 from baselines.optimum.separations import Needs, alike, necessary
-from baselines.optimum.sequencing import WAKE_STEP, Queue, Schedule, scheduled
+from baselines.optimum.sequencing import Queue, Schedule, scheduled
 from baselines.prediction import Floats
 from minisim.arrivals import Arrivals, ranks
 from minisim.control import Controller, Cover, Session, Site
@@ -64,9 +64,15 @@ class Optimum:
     @cached_property
     def bound(self) -> float:
         """No controller has less; `InputError` if there would be too many states."""
-        came, lane = self.arrivals.time.astype(float), self.arrivals.lane.astype(np.int64)
-        packed = (column.tobytes() for column in (came, lane, self._kind))
-        return _bound(alike(self.site), self.depart_speed, *packed)
+        return self._least.bound
+
+    @cached_property
+    def reached(self) -> float:
+        """Of the order that is found under the rules of the bound, which none can keep exactly.
+
+        What it is above the bound is the gap of the search: ties alone, unless states are merged.
+        """
+        return self._least.reached
 
     @cached_property
     def planned(self) -> float:
@@ -87,7 +93,10 @@ class Optimum:
     @property
     def facts(self) -> dict[str, Any]:
         """The numbers, for JSON."""
-        return {"vehicles": self.vehicles, "bound_s": self.bound, "planned_s": self.planned}
+        return {
+            "vehicles": self.vehicles, "bound_s": self.bound, "reached_s": self.reached,
+            "planned_s": self.planned,
+        }  # fmt: skip
 
     @cached_property
     def _kind(self) -> Ints:
@@ -98,10 +107,16 @@ class Optimum:
         return np.asarray(kind, np.int64)
 
     @cached_property
+    def _least(self) -> Least:
+        came, lane = self.arrivals.time.astype(float), self.arrivals.lane.astype(np.int64)
+        packed = (column.tobytes() for column in (came, lane, self._kind))
+        return _least(alike(self.site), self.depart_speed, *packed)
+
+    @cached_property
     def _best(self) -> Schedule:
         plan = drivable(self.site, BUFFER, self.depart_speed)
         came, lane = self.arrivals.time, self.arrivals.lane
-        queue = _queue(came, lane, self._kind, plan, self.site.dt)
+        queue = _queue(came, lane, self._kind, plan, self.site, self.depart_speed)
         return scheduled(queue, plan.rules, bounded=False)
 
 
@@ -181,6 +196,12 @@ def _least_delay(run: Run) -> float | None:
         return None
 
 
+def _planned_delay(run: Run) -> float | None:
+    if _least_delay(run) is None:
+        return None
+    return optimum(run.scenario, run.seed).planned
+
+
 def _above(run: Run) -> float | None:
     return above(mean_delay(run), _least_delay(run))
 
@@ -194,6 +215,11 @@ LEAST = Metric(
     "least_delay_s", _least_delay, "s", title="least delay",
     meaning="no controller has a mean delay below it; none if it is not known",
     equation="best order by dynamic programming (ours; docs/howto/optimum.md)",
+)  # fmt: skip
+PLANNED = Metric(
+    "planned_delay_s", _planned_delay, "s", title="delay as planned",
+    meaning="of the schedule, if vehicles could keep it; none if the least delay is not known",
+    equation="best order with clearances, by dynamic programming (ours; docs/howto/optimum.md)",
 )  # fmt: skip
 ABOVE = Metric(
     "above_least_percent", _above, "%", title="above the least delay",
@@ -211,24 +237,31 @@ def _at_limit(site: Site, depart_speed: float | None) -> Floats:
     return np.array([way.at_limit for way in drives(alike(site), depart_speed)])
 
 
+class Least(NamedTuple):
+    """What the search gives for an arrival table: mean delays [s]."""
+
+    bound: float
+    reached: float  #: of the order found, under the same rules
+
+
 @lru_cache(maxsize=32)
-def _bound(site: Site, depart_speed: float | None, time: bytes, lane: bytes, kind: bytes) -> float:
-    """`Optimum.bound`, kept: a process often runs several controllers on the same arrivals."""
+def _least(site: Site, depart_speed: float | None, time: bytes, lane: bytes, kind: bytes) -> Least:
+    """Kept, as a process often runs several controllers on the same arrivals."""
     came, kinds = np.frombuffer(time), np.frombuffer(kind, np.int64)
     needs = necessary(site, depart_speed)
-    queue = _queue(came, np.frombuffer(lane, np.int64), kinds, needs, site.dt)
-    least = scheduled(queue, needs.rules).bound - float((came + needs.at_limit[kinds]).sum())
-    return max(least, 0.0) / max(len(came), 1)
+    queue = _queue(came, np.frombuffer(lane, np.int64), kinds, needs, site, depart_speed)
+    best, at_limit = scheduled(queue, needs.rules), float((came + needs.at_limit[kinds]).sum())
+    sums = (best.bound, float(best.arrival.sum()))
+    return Least(*(max(each - at_limit, 0.0) / max(len(came), 1) for each in sums))
 
 
-def _queue(came: Floats, lane: Ints, kind: Ints, needs: Needs, dt: float) -> Queue:
-    """The vehicles, by lane; none comes before it would behind the one ahead of it, if alone."""
+def _queue(
+    came: Floats, lane: Ints, kind: Ints, needs: Needs, site: Site, depart_speed: float | None
+) -> Queue:
+    """The vehicles, by lane; none is at its mark before it can be behind those ahead of it."""
     order = np.lexsort((came, lane))
-    enters, lane, kind = (np.ceil(came / dt - 1e-6) * dt)[order], lane[order], kind[order]
-    behind = np.diff(enters, prepend=-math.inf)
-    behind[np.diff(lane, prepend=-1) > 0] = math.inf
-    # A larger time behind only makes the loss smaller.
-    place = np.minimum(np.ceil(behind / WAKE_STEP), needs.approach.shape[1] - 1.0).astype(int)
-    loss = np.where(behind < math.inf, needs.approach[kind, place], 0.0)
+    enters = np.ceil(came[order] / site.dt - 1e-6).astype(np.int64)
+    lane, kind = lane[order], kind[order]
+    ready = earliest(site, enters, lane, kind, needs.marks, depart_speed)
     begins = np.searchsorted(lane, np.arange(lane.max(initial=-1) + 2))
-    return Queue(enters + loss + needs.until[kind], kind, begins)
+    return Queue(ready, kind, begins)

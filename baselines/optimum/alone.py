@@ -31,6 +31,9 @@ class Drive(NamedTuple):
     v: Floats  #: upper bound on its speed there [m/s]
     time: Floats  #: lower bound on the time since the entry [s]; negative before it
     at_limit: float  #: time that the whole way takes at the limits of its roads [s]
+    crossing: float  #: where the junction ends [m]
+    limit: float  #: before the junction [m/s]
+    behind: float  #: and behind it [m/s]
 
     @property
     def before(self) -> float:
@@ -86,15 +89,20 @@ def _drive(law: Law, me: Traits, way: Course, start: float, depart: float | None
             v[after] = np.minimum(v[after], _rising(law, me, speed, behind, s[after] - place))
         elif behind < speed:
             # It brakes comfortably for the lower limit. The step in which it gets there may end
-            # past the place, so for a step's way it may still be faster, by b·dt at most.
-            v[~after] = np.minimum(v[~after], np.sqrt(behind**2 + 2.0 * me.b * (place - s[~after])))
+            # past the place, so for a step's way on either side it may still be faster, by b·dt at
+            # most: it slows down evenly in that step.
+            last = behind + me.b * law.dt
+            braking = np.sqrt(behind**2 + 2.0 * me.b * (place - s[~after]))
+            near = s[~after] > place - last * law.dt
+            v[~after] = np.minimum(v[~after], np.maximum(braking, np.where(near, last, 0.0)))
             late = after & (s < place + behind * law.dt)
             v[late] += me.b * law.dt * (1.0 - (s[late] - place) / (behind * law.dt))
     pace = np.diff(s) / np.maximum(v[:-1], v[1:])
     time = np.concatenate([[0.0], np.cumsum(pace)])
     at_limit = -start / way.before + way.crossing / way.turn
     at_limit += (way.end - way.crossing) / way.behind
-    return Drive(s, v, time - time[s.searchsorted(0.0)], at_limit)
+    since = time - time[s.searchsorted(0.0)]
+    return Drive(s, v, since, at_limit, way.crossing, way.before, way.behind)
 
 
 def _rising(law: Law, me: Traits, v: float, limit: float, past: Floats) -> Floats:

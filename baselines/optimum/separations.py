@@ -50,8 +50,8 @@ SPEEDS = 40
 #: How far past the junction vehicles are compared that follow each other on an exit lane [m].
 PAST = 50.0
 
-#: The longest times behind another vehicle that count, before the junction and behind it [s].
-APPROACH, WAKE = 60.0, 12.0
+#: The longest time behind another vehicle that counts there [s].
+WAKE = 12.0
 
 #: What it costs to lose the order of two movements of a lane [s]: more than anything else.
 LOST = 1e6
@@ -99,9 +99,7 @@ class Needs(NamedTuple):
 
     rules: Rules
     until: Floats  #: least time from insertion to the mark [s], (k,)
-    #: What a vehicle loses on its approach lane at least, by its time behind the vehicle ahead: at
-    #: 0, `WAKE_STEP`, …, shape (k, times) [s].
-    approach: Floats
+    marks: Floats  #: places past the entry, (k,) [m]
     at_limit: Floats  #: what the whole way takes at the limits of its roads [s], (k,)
 
 
@@ -134,18 +132,9 @@ def _necessary(site: Site, depart_speed: float | None) -> Needs:
     )  # fmt: skip
     return Needs(
         rules, np.array([it.before for it in ways]) + at_mark,
-        np.array([_approach(site, k, way) for k, way in enumerate(ways)]),
+        marks[chosen],
         np.array([it.at_limit for it in ways]),
     )  # fmt: skip
-
-
-def _approach(site: Site, kind: int, way: Drive) -> Floats:
-    """What a vehicle loses behind another until it has to slow down for the junction [s]."""
-    junction, m = site.intersection, len(site.intersection.movements)
-    it, limit = site.types[kind // m], site.limit(int(junction.movements.origins[kind % m]))
-    free = np.flatnonzero((way.s <= 0.0) & (way.v >= limit * (1.0 - 1e-6)))
-    end, gone = int(free.max(initial=0)), -float(way.s[0])
-    return _losses(site, it, limit, way, (0, end), gone, it.length, APPROACH)
 
 
 def _wake(site: Site, kind: int, way: Drive) -> tuple[float, Floats]:
@@ -155,22 +144,14 @@ def _wake(site: Site, kind: int, way: Drive) -> tuple[float, Floats]:
     begin = int(way.s.searchsorted(path.crossing + min(PAST, (way.s[-1] - path.crossing) / 2.0)))
     length = min(one.length for one in site.types)
     gone, limit = float(way.s[-1] - way.s[begin]), site.limit(path.exit_arm)
-    lost = _losses(site, it, limit, way, (begin, -1), gone, length, WAKE)
-    return float(way.time[begin]), np.maximum(lost - lost[-1], 0.0)
-
-
-def _losses(
-    site: Site, it: VehicleType, limit: float, way: Drive, ends: tuple[int, int], gone: float,
-    length: float, longest: float,
-) -> Floats:  # fmt: skip
-    count = round(longest / WAKE_STEP) + 1
     if law_of(site).model != IDM:
-        return np.zeros(count)
-    far, alone = (float(it[ends[1]] - it[ends[0]]) for it in (way.s, way.time))
-    return least_losses(
-        traits_of(it), limit, site.dt, length, far, gone, float(way.v[ends[0]]), alone,
-        WAKE_STEP, count,
+        return float(way.time[begin]), np.zeros(round(WAKE / WAKE_STEP) + 1)
+    alone = float(way.time[-1] - way.time[begin])
+    lost = least_losses(
+        traits_of(it), limit, site.dt, length, gone, gone, float(way.v[begin]), alone, WAKE_STEP,
+        round(WAKE / WAKE_STEP) + 1,
     )  # fmt: skip
+    return float(way.time[begin]), np.maximum(lost - lost[-1], 0.0)
 
 
 def _places(site: Site) -> Floats:

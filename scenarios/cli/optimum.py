@@ -15,7 +15,9 @@ from scenarios.cli.shared.terminal import show, show_json
 @app.command(
     epilog="The delay counts against driving on at the roads' limits, from demand to arrival, over "
     "all vehicles: runs go on until the last one has arrived. No controller can have less than the "
-    "bound; the schedule knows all arrivals beforehand. See docs/howto/optimum.md.\n\n"
+    "bound. By its own rules, the best order reaches it; what that is above it is the gap of the "
+    "search. The schedule keeps more room, and knows all arrivals beforehand. See "
+    "docs/howto/optimum.md.\n\n"
     "minisim optimum four-way -p fair -d 250 -c reservation -c dim:gate=harmonious"
 )
 def optimum(

@@ -14,6 +14,7 @@ def test_it_prints_the_bound_the_schedule_and_each_controller(
     told = json.loads(capsys.readouterr().out)
     schedule, reservation = told["controllers"]
     assert 0.0 < told["bound_s"] <= told["planned_s"] <= schedule["delay_s"]
+    assert told["reached_s"] == pytest.approx(told["bound_s"], rel=1e-5)
     assert reservation["controller"] == "reservation"
     assert reservation["above_percent"] == pytest.approx(
         100.0 * (reservation["delay_s"] / told["bound_s"] - 1.0)
