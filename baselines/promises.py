@@ -33,8 +33,9 @@ from minisim.channel import steps
 from minisim.control import Command, Observed, Report, Reserve, Site, View
 from minisim.ticks import time_of
 
-#: Advice that differs less is alike [m/s]: a round number of ours.
-ALIKE = 1.0
+#: Advice that differs no more is alike [m/s]: so vehicles tell each other of a new speed, too (the
+#: rule by which a CAM is generated: ETSI EN 302 637-2, V1.3.1 (2014), 6.1.3).
+ALIKE = 0.5
 
 
 class _Said(NamedTuple):
@@ -142,7 +143,7 @@ class Promises(Passages):
     def advise(self, vehicle: int, speed: float) -> Iterator[Command]:
         """Advise a vehicle a speed [m/s], unless it may hold or has not said that it follows.
 
-        Less than `ALIKE` from the advice before is no news: it would only delay a promise.
+        No more than `ALIKE` from the advice before is no news: it would only delay a promise.
         """
         report = self._reports[vehicle]
         if math.isclose(speed, self._told[vehicle].advice, rel_tol=0.0, abs_tol=ALIKE):

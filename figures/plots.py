@@ -149,7 +149,9 @@ def offset(rows: pd.DataFrame, place: int, count: int) -> float:
     demands = np.unique(rows["density"])
     if len(demands) < 2 or count < 2:
         return 0.0
-    return SPREAD * float(np.diff(demands).min()) * (place / (count - 1) - 0.5)
+    # Within the axes also if there are few demands: see the margin in `density_axis`.
+    step = min(float(np.diff(demands).min()), float(np.ptp(demands)) / 4.0)
+    return SPREAD * step * (place / (count - 1) - 0.5)
 
 
 def density_axis(axes: Axes, densities: Iterable[float] = DENSITIES) -> None:

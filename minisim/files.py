@@ -62,7 +62,7 @@ def replacing(path: AnyPath) -> Iterator[Path]:
     stays: the file that it points to is replaced.
 
     Raises:
-        FileError: the folder is not writable, or `path` is not an ordinary file.
+        FileError: its folder is missing or not writable, or `path` is not an ordinary file.
     """
     instance("output file", path, (str, os.PathLike))
     with _refused(f"write {os.fspath(path)!r}"):
@@ -70,6 +70,8 @@ def replacing(path: AnyPath) -> Iterator[Path]:
         ordinary = target.is_file() or not target.exists()
     if not ordinary:
         raise FileError(f"cannot write {path}: it is not an ordinary file")
+    if not target.parent.is_dir():
+        raise FileError(f"cannot write {path}: {_no_folder(path)}")
     temporary = target.with_name(f".{target.stem}-{uuid.uuid4().hex}{target.suffix}")
     try:
         try:
@@ -79,6 +81,12 @@ def replacing(path: AnyPath) -> Iterator[Path]:
             temporary.unlink(missing_ok=True)
     except OSError as error:
         raise FileError(f"cannot write {path}: {_reason(error)}") from error
+
+
+def _no_folder(path: AnyPath) -> str:
+    """Which folder is missing for a file: its own, or that of the file that it links to."""
+    own = Path(path).parent
+    return f"there is no folder {Path(path).resolve().parent if own.is_dir() else own}"
 
 
 @contextmanager
@@ -138,7 +146,7 @@ def check_file(path: AnyPath, *suffixes: str) -> Path:
         if target.exists() and not target.is_file():
             raise ValueError("it is not an ordinary file")
         if not target.parent.is_dir():
-            raise ValueError(f"there is no folder {target.parent}")
+            raise ValueError(_no_folder(target))
         _probe(target.parent)
     return target
 

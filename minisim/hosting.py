@@ -70,6 +70,8 @@ class Alarm:
         self._every = NEVER if period is None else first_tick(period, dt)
         self._due = NEVER if period is None else 0
         self._asked = NEVER
+        #: The first tick at which vehicles wake it again.
+        self.heeds = 0
 
     @property
     def tick(self) -> int:
@@ -86,6 +88,8 @@ class Alarm:
     def set(self, command: Wake) -> None:
         """Ring once at the command's time; this replaces any earlier request."""
         self._asked = first_tick(command.time, self._dt)
+        undisturbed = command.undisturbed
+        self.heeds = 0 if undisturbed == -math.inf else first_tick(undisturbed, self._dt)
 
 
 @dataclass(frozen=True, eq=False)

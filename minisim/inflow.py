@@ -76,10 +76,9 @@ def counted(inflow: Inflow, duration: float, rng: np.random.Generator) -> tuple[
     """
     times: list[Floats] = []
     lanes: list[Ints] = []
-    for begin, end, rates in inflow.spans(math.ceil(duration)):
-        at_most = _at_most(tuple(rates.tolist()))
-        for start in range(int(begin), int(end), BLOCK):
-            draws = rng.random((min(BLOCK, int(end) - start), len(rates)))
+    for begin, end, at_most in _chances(inflow, math.ceil(duration)):
+        for start in range(begin, end, BLOCK):
+            draws = rng.random((min(BLOCK, end - start), len(at_most)))
             second, lane = np.nonzero(draws >= at_most[:, 0])
             counts = (draws[second, lane, None] >= at_most[lane]).sum(axis=1)
             times.append(np.repeat(start + second, counts).astype(float))
@@ -87,10 +86,16 @@ def counted(inflow: Inflow, duration: float, rng: np.random.Generator) -> tuple[
     return np.concatenate(times), np.concatenate(lanes)
 
 
-@lru_cache(maxsize=256)
-def _at_most(rates: tuple[float, ...]) -> Floats:
+@lru_cache(maxsize=64)
+def _chances(inflow: Inflow, end: int) -> tuple[tuple[int, int, Floats], ...]:
+    """Start and end [s] of each period before `end`, and the chances there, see `_at_most`."""
+    spans = inflow.spans(end)
+    return tuple((int(begin), int(end), _at_most(rates)) for begin, end, rates in spans)
+
+
+def _at_most(rates: Floats) -> Floats:
     """The chance of at most k vehicles in a second at rates [veh/s], (n, k)."""
-    k, mean = np.arange(MOST_IN_A_SECOND), np.array(rates)[:, None]
+    k, mean = np.arange(MOST_IN_A_SECOND), rates[:, None]
     chances = np.exp(-mean) * mean**k / np.cumprod(np.maximum(k, 1))
     at_most: Floats = chances.cumsum(axis=1)
     at_most.setflags(write=False)

@@ -125,12 +125,12 @@ class Simulation(Stepped):
         world = *self._pack, self._vehicles, self._lanes, self._layout, self._law, self._cruise
         scratch = self._trace, self._bodies, self._observed
         step = direct(
-            kernel.advance, self._cruise is None, (*world, *scratch, self._traced, self.tick, 0)
+            kernel.advance, self._cruise is None, (*world, *scratch, self._traced, self.tick, 0, 0)
         )
         while self.tick < target and not self._done:
             end = min(target, self._alarm.tick, self.tick + min(most, self._stride))
             self.tick, reasons, self._traced, self._seen = step(
-                *world, *scratch, self._traced, self.tick, end
+                *world, *scratch, self._traced, self.tick, end, self._alarm.heeds
             )
             if reasons & kernel.TRACE_FULL:
                 self._keep_trace()
@@ -156,8 +156,10 @@ class Simulation(Stepped):
         demand, movements = self._hosted.arrivals.time, self.site.intersection.movements
         return self._hosted.result(
             collisions=self.collisions,
-            columns=collect_trips(self._vehicles[self._row], demand, movements, self.site.dt, end),
-            trace=np.concatenate([*self._traces, self._trace[:0]]),
+            columns=collect_trips(
+                self._vehicles.take(self._row), demand, movements, self.site.dt, end
+            ),
+            trace=np.concatenate(self._traces) if self._traces[1:] else self._traces[0],
             rows=self._vehicles[["id", "path", "type"]].copy(),
             given=tuple(self._given),
         )

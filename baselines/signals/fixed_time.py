@@ -199,7 +199,7 @@ class Programs:
 
 
 class FixedTimeSession:
-    """Shows programs; called when it switches, and when a vehicle clears the junction."""
+    """Shows programs; called when they switch, and while a head is late when a vehicle clears."""
 
     def __init__(self, site: Site, heads: Heads, programs: Programs) -> None:
         self.plan = Plan(
@@ -234,4 +234,7 @@ class FixedTimeSession:
             self._wanted = self._programs.colours(now)
             self._until = self._programs.next_switch(now)
         commands = self._heads.show(view, self._wanted)
-        return [*commands, Wake(min(self._until - self._early, self._heads.next_look))]
+        due = self._until - self._early
+        if self._heads.rests(self._wanted):
+            return [*commands, Wake(due, undisturbed=due - self._half_step)]
+        return [*commands, Wake(min(due, self._heads.next_look))]

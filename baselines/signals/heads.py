@@ -107,6 +107,10 @@ class Heads:
                 self.colours[lane] = Colour.GREEN
         return commands
 
+    def rests(self, wanted: Sequence[Colour]) -> bool:
+        """Whether vehicles matter no more to it until other colours are wanted."""
+        return wanted == self.colours
+
     def _open(self, lane: int) -> list[Command]:
         return [Open(lane)]
 

@@ -118,6 +118,10 @@ class PermittedHeads(Heads):
         self.next_look = view.time + self._look if waiting else math.inf
         return commands
 
+    def rests(self, wanted: Sequence[Colour]) -> bool:  # noqa: ARG002
+        """Never: vehicles that turn give way to others."""
+        return False
+
     def _may_open(self, lane: int, view: View) -> bool:
         sneakers = [v for v in view.vehicles if self._sneakers.get(v.lane) == v.id]
         others = [v for v in sneakers if v.lane not in self._partners[lane]]

@@ -18,7 +18,7 @@ from minisim.results.run import Run
 #: The player's script, in this order.
 SCRIPTS = ("scene.js", "drawing.js", "pane.js", "player.js")
 #: Height of a player of one run in a notebook, and of one of two [px].
-HEIGHTS = (580, 880)
+HEIGHTS = (580, 960)
 
 
 class Player:

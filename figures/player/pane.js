@@ -20,8 +20,10 @@ class Pane {
     this.figure = player.make("figure", "pane");
     const caption = player.make("figcaption", "", this.figure);
     const name = player.make("b", "", caption);
-    name.textContent = name.title = data.controller;
+    name.append(...player.words(data.controller));
+    name.title = data.controller;
     this.counts = player.make("span", "counts", caption);
+    this.count(10, 100, 10); // as wide as they become, for what is fitted before it is drawn
     this.counts.title = "in queues: vehicles in the picture that stand, or have moved up no faster than 10 km/h since; served: those that have left the junction since the start of the scene, without a collision";
     player.make("span", "what", caption).textContent = `${data.title} · ${data.demand} · profile ${data.profile} · seed ${data.seed}`;
     this.canvas = player.make("canvas", "junction", this.figure);
@@ -30,14 +32,13 @@ class Pane {
     this.canvas.addEventListener("click", (event) => this.pick(event));
     this.panel = player.make("section", "report");
     this.name = player.make("h3", "", this.panel);
-    this.name.textContent = data.controller;
+    this.name.append(...player.words(data.controller));
     this.why = player.make("p", "why", this.panel);
     this.why.setAttribute("aria-live", "polite");
     const row = player.make("div", "diagrams", this.panel);
     this.graph = document.createElementNS(SVG, "svg");
     this.graph.setAttribute("class", "graph");
     this.graph.setAttribute("role", "img");
-    this.graph.setAttribute("viewBox", "-105 -94 210 188");
     row.append(this.graph);
     this.strip = player.make("canvas", "strip", row);
     this.strip.setAttribute("role", "img");
@@ -80,9 +81,8 @@ class Pane {
     this.drawCrashes(pen, step, k, at);
     this.drawNames(pen, k, at);
     const seen = near.filter((it) => Math.max(Math.abs(it.x), Math.abs(it.y)) <= reach);
-    const counts = [`in queues ${seen.filter((it) => it.stands).length}`, `served ${lastAt(scene.cleared, step, (it) => it) + 1}`];
-    if (scene.data.collisions.length) counts.unshift(`collisions ${scene.data.collisions.filter(([s]) => s <= step).length}`);
-    player.write(this.counts, counts.join(" · "));
+    const stand = seen.filter((it) => it.stands).length, served = lastAt(scene.cleared, step, (it) => it) + 1;
+    this.count(stand, served, scene.data.collisions.filter(([s]) => s <= step).length);
     this.tell();
     this.drawGraph();
     this.drawStrip(time);
@@ -120,6 +120,12 @@ class Pane {
     for (const line of ground.middles) { trace(pen, pairs(line).map(at)); pen.stroke(); }
     pen.setLineDash([]);
     for (const entry of ground.entries) { shape(entry); pen.fill(); }
+  }
+
+  count(stand, served, collisions) {
+    const counts = [`in queues ${stand}`, `served ${served}`];
+    if (this.scene.data.collisions.length) counts.unshift(`collisions ${collisions}`);
+    this.player.write(this.counts, counts.join(" · "));
   }
 
   drawWays(pen, cars, k, at) {
@@ -255,13 +261,16 @@ class Pane {
     pen.font = "600 14px system-ui, sans-serif";
     pen.textAlign = "center";
     pen.textBaseline = "middle";
-    const wide = pen.measureText(text).width + 10, room = pen.canvas.clientHeight - 12;
-    const above = y - r - 9, below = y + r + 9; // on the side that is away from the junction
-    const up = (car.y >= 0 ? above > 12 : below > room) ? above : below;
+    const wide = pen.measureText(text).width + 10, away = r + 9;
+    // Behind it, off the kerb, where no other vehicle and no signal is.
+    const off = 0.8 * this.scene.kerb;
+    const place = (middle, side, room, half) => Math.min(Math.max(middle + away * side, half), room - half);
+    const left = place(x, off * car.uy - 0.6 * car.ux, pen.canvas.clientWidth, wide / 2) - wide / 2;
+    const down = place(y, off * car.ux + 0.6 * car.uy, pen.canvas.clientHeight, 10);
     pen.fillStyle = colour;
-    pen.fillRect(x - wide / 2, up - 10, wide, 20);
+    pen.fillRect(left, down - 10, wide, 20);
     pen.fillStyle = "#FFFFFF";
-    pen.fillText(text, x, up + 1);
+    pen.fillText(text, left + wide / 2, down + 1);
   }
 
   drawCrashes(pen, step, k, at) {
@@ -327,7 +336,8 @@ class Pane {
   /** The harmony graph: vehicles whose ways do not conflict are joined; those that go are filled. */
   drawGraph() {
     const { scene, player } = this, nodes = scene.participants(this.cars).slice(0, 12);
-    const key = nodes.map((it) => `${it.track.id}${it.goes}${it.stands}`).join() + player.chosen;
+    const { clientWidth: width, clientHeight: height } = this.graph;
+    const key = [player.chosen, width, height, ...nodes.map((it) => `${it.track.id}${it.goes}${it.stands}`)].join();
     if (key === this.graphKey) return;
     this.graphKey = key;
     const make = (tag, attributes, text) => {
@@ -337,10 +347,18 @@ class Pane {
       this.graph.append(element);
     };
     this.graph.replaceChildren();
+    // Nodes on an ellipse in pixels, as large as they can be without touching each other.
+    this.graph.setAttribute("viewBox", `${-width / 2} ${-height / 2} ${width} ${height}`);
+    const share = 0.7 * Math.sin(Math.PI / Math.max(nodes.length, 3));
+    const r = Math.max(Math.min(0.5 * Math.min(width, height) * share / (1 + share), Math.max(30, 0.12 * Math.min(width, height))), 8);
+    const [across, along] = [width, height].map((it) => Math.min(it / 2 - r - 3, 4 * r));
     const places = nodes.map((_, k) => {
       const angle = 2 * Math.PI * (k / Math.max(nodes.length, 1)) - Math.PI / 2;
-      return nodes.length > 1 ? [78 * Math.cos(angle), 68 * Math.sin(angle)] : [0, 0];
+      return nodes.length > 1 ? [across * Math.cos(angle), along * Math.sin(angle)] : [0, 0];
     });
+    const [large, small] = [Math.max(0.72 * r, 11), Math.max(0.56 * r, 10)];
+    this.graph.style.setProperty("--large", `${large}px`);
+    this.graph.style.setProperty("--small", `${small}px`);
     const harmony = (a, b) => a.track.lane !== b.track.lane && !scene.ways[a.track.way].conflicts.includes(b.track.way);
     nodes.forEach((a, i) => nodes.slice(i + 1).forEach((b, j) => {
       if (!harmony(a, b)) return;
@@ -349,11 +367,11 @@ class Pane {
     }));
     nodes.forEach((it, k) => {
       const [cx, cy] = places[k], on = it.track.id === player.chosen;
-      make("circle", { cx, cy, r: 23, class: `node${it.goes ? " goes" : it.stands ? " stands" : ""}${on ? " chosen" : ""}` });
-      make("text", { x: cx, y: cy - 1, class: it.goes ? "goes" : "" }, scene.ways[it.track.way].name);
-      make("text", { x: cx, y: cy + 14, class: `small${it.goes ? " goes" : ""}` }, it.track.id);
+      make("circle", { cx, cy, r, class: `node${it.goes ? " goes" : it.stands ? " stands" : ""}${on ? " chosen" : ""}` });
+      make("text", { x: cx, y: cy - 0.06 * r, class: it.goes ? "goes" : "" }, scene.ways[it.track.way].name);
+      make("text", { x: cx, y: cy + 0.64 * r, class: `small${it.goes ? " goes" : ""}` }, it.track.id);
     });
-    if (!nodes.length) make("text", { x: 0, y: 0, class: "small" }, "no vehicle near the junction");
+    if (!nodes.length) make("text", { x: 0, y: 0, class: "none" }, "no vehicle is near");
     const list = (some) => some.map((it) => `${scene.ways[it.track.way].name} (vehicle ${it.track.id})`).join(", ") || "none";
     this.graph.setAttribute("aria-label", `Harmony graph. Go: ${list(nodes.filter((it) => it.goes))}. Wait: ${list(nodes.filter((it) => !it.goes))}.`);
   }

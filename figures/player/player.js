@@ -59,6 +59,11 @@ class Player extends HTMLElement {
     return element;
   }
 
+  /** A text that may be broken after the signs in it, such as the name of a controller. */
+  words(text) {
+    return text.split(/(?<=[:=,])/).flatMap((part, k) => (k ? [document.createElement("wbr"), part] : [part]));
+  }
+
   /** A colour of the style sheet. */
   look(name) {
     if (!this.colours.has(name)) this.colours.set(name, getComputedStyle(this).getPropertyValue(`--${name}`).trim());
@@ -148,22 +153,22 @@ class Player extends HTMLElement {
   writeLegend() {
     const scenes = this.panes.map((it) => it.scene), some = (test) => scenes.some(test), rows = [];
     const row = (kind, colour, text, extra = "") => rows.push([kind, colour, text, extra]);
-    row("body", "goes", "has the right of way; band: its way");
+    row("body", "goes", "may go; band: its way");
     row("body", "stands", "in a queue");
     row("body", "moves", "moves");
-    row("arrow", "ink", "to its exit; lamps blink if it turns");
+    row("arrow", "ink", "to its exit; lamps if it turns");
     if (some((it) => it.tracks.some((track) => track.human))) row("body outline", "moves", "dark outline: human driver");
     if (some((it) => it.data.collisions.length)) row("cross", "ink", "crossed out: has collided");
     if (some((it) => !it.heads.size)) {
       row("line", "ink", "hold line");
-      row("line", "goes", "hold line whose first vehicle may go");
+      row("line", "goes", "hold line: its first may go");
     }
     if (some((it) => it.heads.size))
       for (const [state, shape] of [["green", "●"], ["amber", "▲"], ["red", "■"]]) row("head", `head-${state}`, `signal: ${state}`, shape);
     const zones = new Map(scenes.flatMap((it) => it.ground.zones.map((zone) => [zone.name, zone.words])));
     for (const [name, words] of zones) row(`zone ${name}`, name, words);
     row("ring", "ink", "the chosen vehicle");
-    row("ring dashed", "stands", "what it waits for, with its way");
+    row("ring dashed", "stands", "what it waits for; its way");
     this.legend.replaceChildren(...rows.map(([kind, colour, text, extra]) => {
       const item = this.make("li"), swatch = this.make("i", kind, item);
       swatch.style.setProperty("--colour", kind.startsWith("zone") ? this.zone(colour) : this.look(colour));
@@ -270,7 +275,7 @@ class Player extends HTMLElement {
     const full = this.hasAttribute("fill") ? this.clientHeight : Math.min(0.85 * window.innerHeight, 720);
     const panel = runs > 1 ? Math.max(345, 0.275 * this.clientWidth) : 330;
     let side = 0, captions = [];
-    for (let twice = 0; twice < 2; twice++) { // a caption may need more lines in a smaller picture
+    for (let often = 0; often < 3; often++) { // a caption may need more lines in a smaller picture
       captions = this.panes.map((it) => it.figure.firstChild.offsetHeight);
       const room = full - this.controls.offsetHeight - 26;
       side = Math.max(150, Math.floor(narrow
@@ -284,8 +289,9 @@ class Player extends HTMLElement {
     const home = runs > 1 && !narrow && below > 110 ? this.controls.parentNode : this.panel;
     if (this.notes.parentNode !== home) home.append(this.notes);
     // A canvas is sharp if its edges are on whole pixels, so the graph beside it is as wide as some.
-    const inner = this.reports.clientWidth - 24;
-    this.style.setProperty("--graph", `${Math.min(320, narrow && inner < 430 ? inner : Math.floor(0.4 * inner))}px`);
+    const inner = (abreast > 1 ? (this.reports.clientWidth - 8) / 2 : this.reports.clientWidth) - 24;
+    const alone = narrow && abreast === 1 && inner < 430;
+    this.style.setProperty("--graph", `${Math.min(320, alone ? inner : Math.floor(0.4 * inner))}px`);
     for (const pane of this.panes) pane.ground.width = 0;
     this.draw();
   }

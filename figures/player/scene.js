@@ -61,6 +61,9 @@ class Scene {
       if (!this.heads.has(lane)) this.heads.set(lane, []);
       this.heads.get(lane).push([step, state]);
     }
+    // On which side of a vehicle the kerb is: 1 on the right, −1 on the left.
+    const [{ in: [ux, uy], points: [x, y] }] = data.ways;
+    this.kerb = uy * x - ux * y > 0 ? 1 : -1;
     // A vehicle gets the right of way, or a head turns: these are decisions.
     const decisions = new Set();
     for (const track of this.tracks)

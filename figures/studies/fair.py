@@ -39,7 +39,7 @@ def fair_figure(results: Results) -> Figure:
 
 
 def crossing_figure(results: Results) -> Figure:
-    """The demands at which DIM does worse than each rival, with both gates."""
+    """The demands at which DIM does worse than each rival, with each of its gates."""
     known = needed_losses(results)
     figure, panels = plots.panels(
         11.0, 7.4, len(MEASURES), left=0.18, right=0.985, top=0.805, bottom=0.1, wspace=0.06

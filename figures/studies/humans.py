@@ -46,7 +46,7 @@ def human_figure(results: Results) -> Figure:
         style.plot_axes(axes, f"{density:g} veh/h/lane", "human drivers [%]", "")
         axes.set_xticks([100.0 * share for share in SHARES[::2]])
         plots.log_time(axes, 1.0, 2000.0)
-    panels[0].set_ylabel("mean delay of all vehicles [s], logarithmic", **style.LABEL)
+    panels[0].set_ylabel("mean delay of each kind [s], logarithmic", **style.LABEL)
     note = (
         f"{missing_note(results)}  Delay is time loss and departure delay, up to the end of the "
         "run for vehicles still there."

@@ -25,23 +25,23 @@ def message_figure(results: Results) -> Figure:
     rows = with_total_delay(results.good)
     run = [density for density in DENSITIES if (rows["density"] == density).any()]
     figure, panels = plots.panels(
-        10.5, 1.6 + 3.1 * len(run), 2 * len(run), rows=len(run), left=0.065, right=0.985, top=0.83,
+        10.5, 1.9 + 3.1 * len(run), 2 * len(run), rows=len(run), left=0.065, right=0.985, top=0.80,
         bottom=0.12, wspace=0.06, hspace=0.34,
     )  # fmt: skip
     for axes, (density, what) in zip(panels, product(run, AXES), strict=True):
         _draw(axes, rows[rows["density"] == density], what)
         style.plot_axes(axes, f"{density:g} veh/h/lane", what, "")
-        plots.log_time(axes, 1.0, 1500.0)
+        plots.log_time(axes, 1.0, 500.0)
     for axes in panels[::2]:
         axes.set_ylabel("mean delay [s], logarithmic", **style.LABEL)
     note = (
         f"{missing_note(results)}  Delay is time loss and departure delay of all vehicles, up to "
         "the end of the run for those still there. Left no message is late, right none is lost."
     )
-    looks = [style.look(name) for name in (*TALKING, *GATES)]
-    looks[2:] = [it._replace(marker="") for it in looks[2:]]
+    looks = [*map(style.look, TALKING)]
+    looks += [style.look(name)._replace(marker="") for name in GATES]
     title = "Messages that get lost or come late, on four arms, profile fair"
-    plots.frame(figure, title, looks, note, marks=0.898)
+    plots.frame(figure, title, looks, note, ncols=4, marks=0.866)
     return figure
 
 

@@ -97,9 +97,13 @@ class Accelerate:
 
 @dataclass(frozen=True, slots=True)
 class Wake:
-    """Wake the session at `time` [s] (once; a later `Wake` replaces an earlier one)."""
+    """Wake the session at `time` [s] (once; a later `Wake` replaces an earlier one).
+
+    Until `undisturbed` [s], vehicles that pass marks or leave need not wake it.
+    """
 
     time: float
+    undisturbed: float = -math.inf
 
 
 Command = Go | Hold | Open | Close | Advise | Brake | Accelerate | Wake
@@ -124,5 +128,7 @@ def check_command(command: Command, tick: int, site: Site, vehicles: int | None 
         if first_tick(number("wake-up time [s]", command.time), site.dt) <= tick:
             now = time_of(tick, site.dt)
             raise InputError(f"wake-up time {command.time:g} s is not after {now:g} s")
+        if command.undisturbed != -math.inf:
+            number("time until which it is undisturbed [s]", command.undisturbed, high=command.time)
     else:
         raise InputError(f"{show(command)} is not a command")

@@ -26,53 +26,67 @@ def may_touch(
     The separating-axis test is exact, and the rectangles are a little larger than the bodies, so
     it misses no touch that pymunk would find.
     """
-    n = count(lanes)
-    inside = False
-    where, away = floats[S], floats[AWAY]
-    for i in range(n):
-        inside |= law.entry <= where[i] <= away[i]
-    if not inside:
+    if not crossed(floats, law, count(lanes)):
         return False
-    ends, shape, headings = layout.ends, layout.shape, layout.headings
     found = 0
     for lane in range(len(lanes)):
         first = lanes[lane]["slot"]
         for i in range(first, first + lanes[lane]["driving"]):
-            s, p, length = where[i], ints[PATH, i], floats[LENGTH, i]
-            if s < law.entry - law.longest:
+            if floats[S, i] < law.entry - law.longest:
                 break
-            if s > away[i]:
-                continue
-            if found == len(bodies):
-                return True
-            past, crossing = s - law.entry, ends[p, 0] - law.entry
-            x, y = place(shape[p], headings[p], crossing, past)
-            kind = ints[TYPE, i]
-            axle = layout.types[kind].rear_axle
-            if axle > 0.0:
-                ux, uy = drag(shape[p], headings[p], crossing, past, layout.trails[kind, p], axle)
-            else:
-                x_rear, y_rear = place(shape[p], headings[p], crossing, past - length)
-                along = math.hypot(x - x_rear, y - y_rear)
-                ux, uy = (x - x_rear) / along, (y - y_rear) / along
-            bodies[found, 0] = x - ux * length / 2.0
-            bodies[found, 1] = y - uy * length / 2.0
-            bodies[found, 2] = ux
-            bodies[found, 3] = uy
-            bodies[found, 4] = length / 2.0 + TOUCH_MARGIN
-            bodies[found, 5] = layout.types[kind].width / 2.0 + TOUCH_MARGIN
-            found += 1
+            if floats[S, i] <= floats[AWAY, i]:
+                if found == len(bodies):
+                    return True
+                embody(floats, ints, layout, law, i, bodies[found])
+                found += 1
     for i in range(found):
         for j in range(i):
-            dx = bodies[i, 0] - bodies[j, 0]
-            dy = bodies[i, 1] - bodies[j, 1]
-            long, wide = bodies[i, 4] + bodies[j, 4], bodies[i, 5] + bodies[j, 5]
-            if dx * dx + dy * dy < long * long + wide * wide and rectangles_meet(
-                dx, dy, bodies[i, 2], bodies[i, 3], bodies[j, 2], bodies[j, 3],
-                bodies[i, 4], bodies[i, 5], bodies[j, 4], bodies[j, 5],
-            ):  # fmt: skip
+            if bodies_meet(bodies[i], bodies[j]):
                 return True
     return False
+
+
+@njit_inline
+def crossed(floats: Floats, law: Law, n: int) -> bool:
+    """Whether any vehicle is in the junction, or not far past it."""
+    s, away = floats[S], floats[AWAY]
+    inside = False
+    for i in range(n):
+        inside |= (s[i] >= law.entry) & (s[i] <= away[i])
+    return inside
+
+
+@njit_inline
+def embody(floats: Floats, ints: Ints, layout: Layout, law: Law, i: int, body: Floats) -> None:
+    """Fill in a vehicle's body: its centre, its heading, and half of its length and width [m]."""
+    p, kind, length = ints[PATH, i], ints[TYPE, i], floats[LENGTH, i]
+    shape, headings = layout.shape[p], layout.headings[p]
+    past, crossing = floats[S, i] - law.entry, layout.ends[p, 0] - law.entry
+    x, y = place(shape, headings, crossing, past)
+    axle = layout.types[kind].rear_axle
+    if past <= 0.0:
+        ux, uy = headings[0], headings[1]
+    elif axle > 0.0:
+        ux, uy = drag(shape, headings, crossing, past, layout.trails[kind, p], axle)
+    else:
+        x_rear, y_rear = place(shape, headings, crossing, past - length)
+        dx, dy = x - x_rear, y - y_rear
+        along = math.sqrt(dx * dx + dy * dy)
+        ux, uy = dx / along, dy / along
+    body[0], body[1] = x - ux * length / 2.0, y - uy * length / 2.0
+    body[2], body[3] = ux, uy
+    body[4] = length / 2.0 + TOUCH_MARGIN
+    body[5] = layout.types[kind].width / 2.0 + TOUCH_MARGIN
+
+
+@njit_inline
+def bodies_meet(one: Floats, other: Floats) -> bool:
+    """Whether two bodies, as `embody` fills them in, meet; most are too far apart."""
+    dx, dy = one[0] - other[0], one[1] - other[1]
+    reach = one[4] + one[5] + other[4] + other[5]  # no corner is farther from its centre
+    return dx * dx + dy * dy < reach * reach and rectangles_meet(
+        dx, dy, one[2], one[3], other[2], other[3], one[4], one[5], other[4], other[5]
+    )
 
 
 @njit_inner

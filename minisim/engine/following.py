@@ -1,9 +1,11 @@
 """How vehicles choose their accelerations, from the state at the beginning of a step.
 
 Three passes over the packed arrays: who the leaders are, what they ask for, and the acceleration.
-Plain loops over few arrays each, so that the compiler vectorises them. A vehicle with nothing but a
-leader ahead, which is most of them, needs no more than these loops; the others are flagged, and
-take `careful`.
+Plain loops, so that the compiler vectorises them: each writes one array, and reads seven at most.
+None changes an array only where a condition holds, or to a minimum of what it was: that would
+become a masked store, for which the next loop has to wait. A vehicle with nothing but a leader
+ahead, which is most of them, needs no more than these loops; the others are flagged, and take
+`careful`.
 """
 
 from __future__ import annotations
@@ -59,6 +61,7 @@ from minisim.laws import (
     keep_room,
     obey,
     room_behind,
+    short_of,
     slow_down,
 )
 
@@ -70,28 +73,30 @@ def accelerate(
 ) -> bool:  # fmt: skip
     """Choose every vehicle's acceleration; returns whether two overlap."""
     n = count(lanes)
-    next_ahead(floats, padded(n))
+    next_ahead(floats, law, padded(n))
     overlap = False
     for lane in range(len(lanes)):
         overlap |= near_junction(floats, ints, lanes, layout, law, lane)
     overlap |= weigh(floats, ints, layout, law, n)
     choose(floats, ints, vehicles, lanes, layout, law)
     keep_rooms(floats, ints, layout, law, n)
-    limit(floats, n, braking)
+    if braking:
+        obey_brakes(floats, n)
     return overlap
 
 
 @njit_inline
-def next_ahead(floats: Floats, n: int) -> None:
+def next_ahead(floats: Floats, law: Law, n: int) -> None:
     """Take the vehicle in the slot before for the leader; right only before the junction."""
-    s, v, length, b_max = floats[S], floats[V], floats[LENGTH], floats[B_MAX]
-    gap, lead_v, lead_b = floats[GAP], floats[LEAD_V], floats[LEAD_B]
+    s, v, length, gap, lead_v = floats[S], floats[V], floats[LENGTH], floats[GAP], floats[LEAD_V]
     for i in range(1, n):
         gap[i] = s[i - 1] - length[i - 1] - s[i]
     for i in range(1, n):
         lead_v[i] = v[i - 1]
-    for i in range(1, n):
-        lead_b[i] = b_max[i - 1]
+    if law.semi_implicit or law.mixed:
+        b_max, lead_b = floats[B_MAX], floats[LEAD_B]
+        for i in range(1, n):
+            lead_b[i] = b_max[i - 1]
 
 
 @njit_inline
@@ -180,12 +185,11 @@ def weigh(floats: Floats, ints: Ints, layout: Layout, law: Law, n: int) -> bool:
     m = padded(n)
     for i in range(n):
         overlap |= gap[i] <= 0.0
-    if law.model == IDM or law.model == IIDM:  # `gap_ratio`, in two loops
+    if law.model == IDM or law.model == IIDM:  # `gap_ratio`
         headway, root, min_gap = floats[HEADWAY], floats[ROOT], floats[MIN_GAP]
         for i in range(m):
-            z[i] = v[i] * headway[i] + v[i] * (v[i] - lead_v[i]) / root[i]
-        for i in range(m):
-            wanted = (min_gap[i] + (z[i] if z[i] > 0.0 else 0.0)) / gap[i]
+            dynamic = v[i] * headway[i] + v[i] * (v[i] - lead_v[i]) / root[i]
+            wanted = (min_gap[i] + (dynamic if dynamic > 0.0 else 0.0)) / gap[i]
             z[i] = max(wanted if gap[i] > 0.0 else math.inf, closest[i])
     else:
         for i in range(n):
@@ -195,12 +199,13 @@ def weigh(floats: Floats, ints: Ints, layout: Layout, law: Law, n: int) -> bool:
                 z[i] = max(z[i], closeness(v[i], gap[i], lead_v[i], mine, law))
     if law.semi_implicit or law.mixed:
         for i in range(n):
-            room[i] = room_behind(gap[i], lead_v[i], lead_b[i], layout.types[ints[TYPE, i]], law)
+            mine = layout.types[ints[TYPE, i]]
+            behind = room_behind(gap[i], lead_v[i], lead_b[i], mine, law)
+            room[i] = min(behind, narrowest[i])
     else:  # `room_behind` with equal brakes
         for i in range(m):
-            room[i] = 2.0 * b_max[i] * (gap[i] - law.room) + lead_v[i] * lead_v[i]
-    for i in range(m):
-        room[i] = min(room[i], narrowest[i])
+            behind = 2.0 * b_max[i] * (gap[i] - law.room) + lead_v[i] * lead_v[i]
+            room[i] = min(behind, narrowest[i])
     return overlap
 
 
@@ -208,22 +213,20 @@ def weigh(floats: Floats, ints: Ints, layout: Layout, law: Law, n: int) -> bool:
 def choose(
     floats: Floats, ints: Ints, vehicles: Records, lanes: Records, layout: Layout, law: Law
 ) -> None:
-    """The acceleration that the law, the limits and the hold line allow."""
+    """The acceleration that the law, the limits, the hold line and the brakes allow."""
     n, flag = count(lanes), floats[FLAG]
     if law.model == IDM and law.quartic:
         s, v, acc, ratio, z = floats[S], floats[V], floats[ACC], floats[RATIO], floats[CLOSENESS]
-        a, b, top = floats[A], floats[B], floats[LIMIT]
+        a, b, b_max, top = floats[A], floats[B], floats[B_MAX], floats[LIMIT]
         care, reach = floats[CARE], floats[REACH]
         m = padded(n)
         for i in range(m):
-            acc[i] = free_road(ratio[i], a[i], b[i], 4.0)
-        for i in range(m):
-            acc[i] = acc[i] - a[i] * z[i] * z[i]
+            wanted = free_road(ratio[i], a[i], b[i], 4.0) - a[i] * z[i] * z[i]
+            acc[i] = max(wanted, -b_max[i])
         for i in range(m):
             near = v[i] + reach[i]
-            flag[i] = 1.0 if near * near >= 2.0 * b[i] * (care[i] - s[i]) else 0.0
-        for i in range(m):
-            flag[i] = 1.0 if v[i] < top[i] < v[i] + acc[i] * law.dt else flag[i]
+            brakes = near * near >= 2.0 * b[i] * (care[i] - s[i])
+            flag[i] = 1.0 if brakes or v[i] < top[i] < v[i] + acc[i] * law.dt else 0.0
     else:
         for i in range(n):
             flag[i] = 1.0
@@ -251,7 +254,7 @@ def careful(
         k += 1
     if s < law.entry and not ints[RELEASED, i]:
         acc = min(acc, hold(v, s, mine, law))
-    floats[ACC, i] = acc
+    floats[ACC, i] = max(acc, -floats[B_MAX, i])
     first = lanes[ints[LANE, i]]["slot"]
     front = first + lanes[ints[LANE, i]]["entered"]
     if i > front and v * v > 2.0 * mine.b_max * (law.entry - s):
@@ -267,25 +270,25 @@ def careful(
 
 @njit_inline
 def keep_rooms(floats: Floats, ints: Ints, layout: Layout, law: Law, n: int) -> None:
-    """Brake harder where the room behind a leader asks for it."""
-    v, acc, room, b_max, flag = floats[V], floats[ACC], floats[ROOM], floats[B_MAX], floats[FLAG]
-    for i in range(padded(n)):
+    """Brake harder where the room behind a leader asks for it: `short_of` for all, then some."""
+    v, acc, room, b_max = floats[V], floats[ACC], floats[ROOM], floats[B_MAX]
+    short = False
+    for i in range(n):
         v_new = v[i] + acc[i] * law.dt
         top = v_new if v_new > v[i] else v[i]
-        flag[i] = 1.0 if top * (top + 2.0 * b_max[i] * law.dt) > room[i] else 0.0
+        short |= top * (top + 2.0 * b_max[i] * law.dt) > room[i]
+    if not short:
+        return
     for i in range(n):
-        if flag[i] != 0.0:
-            mine = layout.types[ints[TYPE, i]]
-            acc[i] = min(acc[i], keep_room(v[i], room[i], mine, law))
+        mine = layout.types[ints[TYPE, i]]
+        if short_of(room[i], v[i], v[i] + acc[i] * law.dt, mine, law):
+            acc[i] = max(min(acc[i], keep_room(v[i], room[i], mine, law)), -b_max[i])
 
 
 @njit_inline
-def limit(floats: Floats, n: int, braking: bool) -> None:
-    """Keep within what the brakes can do, and brake where a command says so."""
+def obey_brakes(floats: Floats, n: int) -> None:
+    """Brake where a command says so, within what the brakes can do."""
     v, acc, b_max = floats[V], floats[ACC], floats[B_MAX]
-    if braking:
-        for i in range(n):
-            brake = floats[BRAKE, i] if v[i] > 0.0 else max(floats[BRAKE, i], 0.0)
-            acc[i] = min(acc[i], brake)
-    for i in range(padded(n)):
-        acc[i] = max(acc[i], -b_max[i])
+    for i in range(n):
+        brake = floats[BRAKE, i] if v[i] > 0.0 else max(floats[BRAKE, i], 0.0)
+        acc[i] = max(min(acc[i], brake), -b_max[i])

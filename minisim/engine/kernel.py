@@ -51,6 +51,7 @@ def advance(
     traced: int,
     tick: int,
     until: int,
+    heeds: int,
 ) -> tuple[int, int, int, int]:
     """Advance from `tick` to `until` at most; stop after any step that gives a reason to return.
 
@@ -60,6 +61,7 @@ def advance(
         trace: the recording, filled from line `traced` on.
         bodies: scratch space (k, 6) for the k vehicles that can be in or near the junction at once.
         observed: filled with what a view shows at the end, see `observe`.
+        heeds: the first tick at which vehicles wake the session.
 
     Returns:
         The tick reached, the reasons (bits, 0 at `until`), and the numbers of lines recorded and
@@ -70,6 +72,8 @@ def advance(
     while tick < until and reasons == 0:
         reasons = step(floats, ints, vehicles, lanes, layout, law, cruise, bodies, braking, tick)
         tick += 1
+        if tick < heeds:
+            reasons &= ~(MARKED | CLEAR)
         if law.record_from <= tick < law.record_to:
             traced = record(floats, ints, lanes, layout, law, trace, traced, tick)
             if traced + lanes[-1]["end"] > len(trace):

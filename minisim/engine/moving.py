@@ -86,11 +86,11 @@ def add_up(floats: Floats, n: int) -> None:
     v, top, ratio = floats[V], floats[LIMIT], floats[RATIO]
     waited, lost = floats[WAITED], floats[LOST]
     for i in range(padded(n)):
-        ratio[i] = v[i] / top[i]
-    for i in range(padded(n)):
         waited[i] += 1.0 if v[i] <= HALTING else 0.0
     for i in range(padded(n)):
-        lost[i] += 1.0 - ratio[i] if v[i] < top[i] else 0.0
+        r = v[i] / top[i]
+        ratio[i] = r
+        lost[i] += 1.0 - r if v[i] < top[i] else 0.0
 
 
 @njit_inner

@@ -23,19 +23,19 @@ from minisim.laws import STOP_MARGIN, Law
 S, V, ACC, LENGTH, B_MAX, A, B, HEADWAY, MIN_GAP, WAITED, LOST, BRAKE = range(12)
 #: 2√(ab) of the IDM; the limit where it is, times the driver's factor; v over that limit.
 ROOT, LIMIT, RATIO = 12, 13, 14
-#: The leader: the gap to its rear bumper, its speed, and the most that its brakes can do.
-GAP, LEAD_V, LEAD_B = 15, 16, 17
 #: What other leaders ask for: a lower bound on `closeness`, an upper one on `room_behind`.
-CLOSEST, NARROWEST = 18, 19
-#: `closeness` and `room_behind` of all leaders together.
-CLOSENESS, ROOM = 20, 21
+CLOSEST, NARROWEST = 15, 16
 #: The first `s` ahead that may call for braking, and how fast it is left behind in a step.
-CARE, REACH = 22, 23
+CARE, REACH = 17, 18
 #: The next `s` at which something happens, such as a wake-up mark, and where it matters no more
-#: whether its body touches another near the junction.
-EVENT, AWAY = 24, 25
-#: 1 where a vehicle needs the full rules, or else 0; `s` of its exit from the junction.
-FLAG, LEAVE = 26, 27
+#: whether its body touches another near the junction; `s` of its exit from the junction.
+EVENT, AWAY, LEAVE = 19, 20, 21
+#: All rows from here on are new in each step.
+LASTING = 22
+#: The leader: the gap to its rear bumper, its speed, and the most that its brakes can do.
+GAP, LEAD_V, LEAD_B = 22, 23, 24
+#: `closeness` and `room_behind` of all leaders together; 1 where a vehicle needs the full rules.
+CLOSENESS, ROOM, FLAG = 25, 26, 27
 FLOATS = 28
 
 #: Rows of the array of integers. `AHEAD` is a slot, or -1 once that vehicle has arrived.
@@ -49,7 +49,16 @@ def empty_pack(vehicles: Records, lanes: Records, layout: Layout) -> tuple[Float
     longest_queue = int((layout.ends[:, 1] - layout.ends[:, 3]).max() / shortest) + 2
     most = min(len(vehicles), len(lanes) * longest_queue)
     width = (most + 7) // 8 * 8 + 8
-    return np.ones((FLOATS, width)), np.zeros((INTS, width), np.int64)
+    ints = aligned(INTS * width).view(np.int64)
+    ints[:] = 0
+    return aligned(FLOATS * width).reshape(FLOATS, width), ints.reshape(INTS, width)
+
+
+def aligned(size: int) -> Floats:
+    """Ones that begin at a cache line of 64 bytes, so that no vector of them spans two."""
+    ones = np.ones(size + 8)
+    start = -ones.ctypes.data // 8 % 8
+    return ones[start : start + size]
 
 
 @njit_inline
@@ -103,20 +112,11 @@ def admit(
 def shift(floats: Floats, ints: Ints, lanes: Records, lane: int, at: int, by: int) -> None:
     """Make room for a slot on a lane (`by` 1), or close the gap that one leaves (`by` -1)."""
     n = count(lanes)
-    if by > 0:
-        for k in range(FLOATS):
-            for i in range(n, at, -1):
-                floats[k, i] = floats[k, i - 1]
-        for k in range(INTS):
-            for i in range(n, at, -1):
-                ints[k, i] = ints[k, i - 1]
-    else:
-        for k in range(FLOATS):
-            for i in range(at, n - 1):
-                floats[k, i] = floats[k, i + 1]
-        for k in range(INTS):
-            for i in range(at, n - 1):
-                ints[k, i] = ints[k, i + 1]
+    for k in range(LASTING):
+        shift_row(floats[k, at : n + 1], by)
+    for k in range(INTS):
+        for i in range(n, at, -1) if by > 0 else range(at, n - 1):
+            ints[k, i] = ints[k, i - by]
     for i in range(n + by):
         ints[AHEAD, i] = shifted(ints[AHEAD, i], at, by)
     for arm in range(len(lanes)):
@@ -124,6 +124,21 @@ def shift(floats: Floats, ints: Ints, lanes: Records, lane: int, at: int, by: in
         if arm > lane:
             lanes[arm]["slot"] += by
     lanes[lane]["driving"] += by
+
+
+@njit_inline
+def shift_row(row: Floats, by: int) -> None:
+    """Move all but the last one back (`by` 1), or all but the first forward (`by` -1).
+
+    A function over a part, whose indices are never below 0: so the compiler vectorises its loops.
+    """
+    last = len(row) - 1
+    if by > 0:
+        for i in range(last):
+            row[last - i] = row[last - i - 1]
+    else:
+        for i in range(last):
+            row[i] = row[i + 1]
 
 
 @njit_inline

@@ -13,7 +13,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields
 from functools import cached_property
-from itertools import compress, pairwise
+from itertools import pairwise
 from typing import Any, Literal
 
 import numpy as np
@@ -23,7 +23,7 @@ from minisim.fields import Takes
 from minisim.junction.movements import ARM_NAMES, Bools, Movement, Movements, movements_of
 from minisim.junction.paths import Bundle, Path, Way
 from minisim.junction.roads import Road
-from minisim.junction.tracing import MIN_PATH_RADIUS, build_path, smallest_radius
+from minisim.junction.tracing import MIN_PATH_RADIUS, build_paths, tightest
 from minisim.parameters import Reals, checked, declared, part, real, word
 
 #: Smallest angle between two arms [deg].
@@ -136,11 +136,11 @@ class Intersection:
         if self.junction_radius is None:
             object.__setattr__(self, "junction_radius", smallest)
         number("junction_radius [m]", self.junction_radius, above=0, below=min(self.lengths) - 10)
-        tightest = min(smallest_radius(self, m) for m in compress(self.movements, self.allowed))
-        if tightest < MIN_PATH_RADIUS - 1e-9:
+        radius = tightest(self)
+        if radius < MIN_PATH_RADIUS - 1e-9:
             raise InputError(
                 f"junction_radius {self.junction_radius:g} m leaves a path of radius "
-                f"{max(tightest, 0):.2g} m; a car needs {MIN_PATH_RADIUS:g} m "
+                f"{max(radius, 0):.2g} m; a car needs {MIN_PATH_RADIUS:g} m "
                 f"(the default here is {smallest:.3g} m)"
             )
         self._check_ways()
@@ -149,7 +149,7 @@ class Intersection:
         """What makes it: copies in other processes work out the rest themselves."""
         return {it.name: getattr(self, it.name) for it in fields(self)}
 
-    @property
+    @cached_property
     def arms(self) -> tuple[Arm, ...]:
         """The arms, clockwise from north."""
         return tuple(Arm(ARM_NAMES[i], b) for i, b in enumerate(self.bearings))
@@ -260,7 +260,7 @@ class Intersection:
     @cached_property
     def paths(self) -> tuple[Path, ...]:
         """One path per movement, in the order of `movements`."""
-        return tuple(build_path(self, m) for m in self.movements)
+        return build_paths(self)
 
     @cached_property
     def bundle(self) -> Bundle:

@@ -16,7 +16,7 @@ import shapely
 from minisim.fleet import Fleet, Vehicles
 from minisim.junction.geometry import Intersection
 from minisim.junction.movements import Ints
-from minisim.junction.paths import Floats, Path
+from minisim.junction.paths import Bundle, Floats, Path
 from minisim.junction.sweeps import ROUNDING, boxes_apart, stretch, swing
 from minisim.vehicle import VehicleType
 
@@ -100,20 +100,33 @@ def turning_room(intersection: Intersection, fleet: Fleet) -> float:
     ends = np.array([path.exit for path in intersection.paths]) + vehicle.length
     places, counts = _places(intersection, np.minimum(reach[p, q], ends[p]), 0.3)
     pair = np.repeat(np.arange(len(p)), counts)
-    p, q = p[pair], q[pair]
-    rear = places[np.arange(len(pair)) - (counts.cumsum() - counts)[pair]]
-    centre, heading = bundle.pose(p, rear + vehicle.length, vehicle)
-    half = np.array([vehicle.length, vehicle.width]) / 2.0
-    pace = swing(intersection, vehicle) * gaps[1]
-    k, least = np.full(len(pair), len(gaps) - 1), 0
+    p, q, at = p[pair], q[pair], np.arange(len(pair)) - (counts.cumsum() - counts)[pair]
+    leading = bundle.pose(np.arange(len(ends))[:, None], places + vehicle.length, vehicle)
+    rows = q, places[at], *(it[p, at] for it in leading)
+    pace, most = swing(intersection, vehicle) * gaps[1], 0
+    for some in (slice(None, None, 8), slice(None)):  # some tell much of it, which spares the rest
+        most = _touching(bundle, vehicle, gaps, pace, most, *(it[some] for it in rows))
+    return float(gaps[most]) + 0.1 * vehicle.width
+
+
+def _touching(
+    bundle: Bundle, vehicle: VehicleType, gaps: Floats, pace: Floats, least: int,
+    which: Ints, rear: Floats, centre: Floats, heading: Floats,
+) -> int:  # fmt: skip
+    """Index of the largest of `gaps` at which a body touches one ahead, or `least` if that is more.
+
+    The bodies ahead are given by rear bumper, centre and heading; `which` are the paths of those
+    behind. No point of these moves more than `pace` [m] on each path from one gap to the next.
+    """
+    half, k = np.array([vehicle.length, vehicle.width]) / 2.0, np.full(len(which), len(gaps) - 1)
     while len(k):  # from the largest gap down: bodies that are far apart stay apart for a while
-        other, its = bundle.pose(q, rear - gaps[k], vehicle)
+        other, its = bundle.pose(which, rear - gaps[k], vehicle)
         room = boxes_apart(centre - other, heading, its, half, half)
         least = max(least, int(k[room <= 0.0].max(initial=0)))
-        k = k - np.maximum(((room - ROUNDING) / pace[q]).astype(int), 1)
+        k = k - np.maximum(((room - ROUNDING) / pace[which]).astype(int), 1)
         left = k > least
-        k, q, rear, centre, heading = (it[left] for it in (k, q, rear, centre, heading))
-    return float(gaps[least]) + 0.1 * vehicle.width
+        k, which, rear, centre, heading = (it[left] for it in (k, which, rear, centre, heading))
+    return least
 
 
 @lru_cache(maxsize=64)

@@ -137,7 +137,7 @@ class Bundle:
 
     def position(self, which: Indices, s: npt.ArrayLike) -> Floats:
         """x, y [m] at `s`, shape (..., 2); straight on beyond both ends."""
-        entry, end, step, *headings = (column[which] for column in self._table)
+        entry, end, step, x_in, y_in, x_out, y_out = (it.take(which) for it in self._table)
         s = np.asarray(s, dtype=float)
         past = s - entry
         t = np.clip(past / step, 0.0, ARC_SEGMENTS)
@@ -145,12 +145,12 @@ class Bundle:
         w = t - k
         k = k + np.multiply(which, ARC_SEGMENTS + 1)
         before, after, rest = np.minimum(past, 0.0), np.maximum(s - end, 0.0), 1.0 - w
-        return np.stack([
-            points.take(k) * rest + points.take(k + 1) * w + before * enters + after * leaves
-            for points, enters, leaves in zip(
-                self._points, headings[:2], headings[2:], strict=True
-            )
-        ], axis=-1)  # fmt: skip
+        place = np.empty((*w.shape, 2))
+        for axis, enters, leaves in ((0, x_in, x_out), (1, y_in, y_out)):
+            points = self._points[axis]
+            inside = points.take(k) * rest + points.take(k + 1) * w
+            place[..., axis] = inside + before * enters + after * leaves
+        return place
 
     def pose(self, which: Indices, s: npt.ArrayLike, vehicle: VehicleType) -> tuple[Floats, Floats]:
         """Centre (..., 2) [m] and unit heading (..., 2) of a body whose front bumper is at `s`.
@@ -163,7 +163,8 @@ class Bundle:
             heading = self._dragged(which, s, vehicle.rear_axle)
         else:
             along = front - self.position(which, np.asarray(s, dtype=float) - vehicle.length)
-            heading = along / np.linalg.norm(along, axis=-1, keepdims=True)
+            x, y = along[..., 0], along[..., 1]
+            heading = along / np.sqrt(x * x + y * y)[..., None]
         return front - heading * (vehicle.length / 2.0), heading
 
     def _dragged(self, which: Indices, s: npt.ArrayLike, axle: float) -> Floats:

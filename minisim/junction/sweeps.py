@@ -31,7 +31,7 @@ SWEEP_STEP = 0.5
 COARSE = 0.05
 
 #: How many hulls in a row are compared at once.
-BLOCK = 8
+BLOCK = 4
 
 #: Distances are right to this [m], far more than rounding takes.
 ROUNDING = 1e-9
@@ -113,17 +113,20 @@ def meeting(
     """
     lines, rooms = zip(*(_trace(intersection, kind) for kind in kinds), strict=True)
     line, room, far = np.concatenate(lines), np.concatenate(rooms), clearance - 2.0 * COARSE
-    coarse = shapely.simplify(line, COARSE)
-    shapely.prepare(coarse)
+    coarse = shapely.simplify(line, COARSE, preserve_topology=False)  # a line has none
+    crossing = coarse if far >= 0.0 else line
+    for its in (coarse, crossing):
+        shapely.prepare(its)
     i, j = pairs.T
-    if far > 0.0:
-        near = shapely.dwithin(coarse[i], coarse[j], far)
-    else:
-        near = shapely.intersects(line[i], line[j])
+    near = shapely.intersects(crossing[i], crossing[j])
     sure, open_ = np.ones(len(pairs), bool), np.flatnonzero(~near)
     i, j = pairs[open_].T
     reach = clearance + room[i] + room[j] + 2.0 * COARSE + ROUNDING
     open_ = open_[shapely.dwithin(coarse[i], coarse[j], reach)]
+    if far > 0.0:
+        i, j = pairs[open_].T
+        near[open_] = shapely.dwithin(coarse[i], coarse[j], far)
+        open_ = open_[~near[open_]]
     gaps = _gaps(intersection, kinds, clearance, pairs[open_])
     near[open_], sure[open_] = gaps <= clearance, np.abs(gaps - clearance) > ROUNDING
     return near, sure
@@ -291,8 +294,9 @@ def _around(intersection: Intersection, vehicle: VehicleType, longer: Floats) ->
     begin, end = swept.rear[swept.first], swept.front[swept.first + 1]
     (x, y), (u, v) = np.moveaxis(swept.hulls.corners - begin[:, None], -1, 0), (end - begin).T
     u, v = u[:, None], v[:, None]
-    share = ((x * u + y * v) / (u * u + v * v)).clip(0.0, 1.0)
-    farthest = np.hypot(x - share * u, y - share * v).max(axis=1)
+    share = np.minimum(np.maximum((x * u + y * v) / (u * u + v * v), 0.0), 1.0)
+    x, y = x - share * u, y - share * v
+    farthest = np.sqrt((x * x + y * y).max(axis=1))
     most = _most(swept, farthest, len(longer))
     return most + _off(swept, swept.rear, swept.front, (vehicle.length + SWEEP_STEP) * longer)
 

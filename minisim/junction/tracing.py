@@ -25,75 +25,105 @@ MIN_PATH_RADIUS = 4.0
 STRAIGHT = 1e-4
 
 
-def smallest_radius(intersection: Intersection, movement: Movement) -> float:
+#: How far along an arc its points are, from 0 to 1.
+SHARES = np.linspace(0.0, 1.0, ARC_SEGMENTS + 1)[:, None]
+
+#: A point of a path [m] and the unit vector along it there, shape (2,) each.
+End = tuple[Floats, Floats]
+
+
+def tightest(intersection: Intersection) -> float:
+    """Smallest radius of the allowed paths [m]; at most 0 if one should be an arc and cannot."""
+    movements, allowed = intersection.movements, intersection.allowed
+    between = zip(
+        movements.origins[allowed].tolist(), movements.exits[allowed].tolist(), strict=True
+    )
+    return min(_smallest_radius(intersection, *arms) for arms in between)
+
+
+def build_paths(intersection: Intersection) -> tuple[Path, ...]:
+    """One path per movement, in the order of `Intersection.movements`."""
+    movements, arms = intersection.movements, range(intersection.n)
+    entries, exits = ([of(intersection, arm) for arm in arms] for of in (_entry, _exit))
+    return tuple(
+        _build_path(intersection, movement, arm, entries[movement.origin], exits[arm])
+        for movement, arm in zip(movements, movements.exits.tolist(), strict=True)
+    )
+
+
+def _smallest_radius(intersection: Intersection, origin: int, exit_arm: int) -> float:
     """Smallest radius of a path [m]; at most 0 if it should be one arc, and none is possible."""
-    if not _mirrored(intersection, movement):
-        return _curve(intersection, movement).radius
-    half = _half_angle(intersection, movement)
-    slope = math.tan(half)
-    offset = intersection.offsets[movement.origin] / slope
+    if not _mirrored(intersection, origin, exit_arm):
+        return _curve(_entry(intersection, origin), _exit(intersection, exit_arm)).radius
+    slope = math.tan(_half_angle(intersection, origin, exit_arm))
+    offset = intersection.offsets[origin] / slope
     # From the entry to where the two lane centre lines meet.
     tangent = intersection.junction_radius + (-offset if intersection.side == "left" else offset)
     return tangent * min(abs(slope), 1e6)
 
 
-def build_path(intersection: Intersection, movement: Movement) -> Path:
-    """The path of a movement."""
-    exit_arm, entry = intersection.exit_arm(movement), intersection.approach_length
-    start, heading_in, end, heading_out = _ends(intersection, movement)
+def _build_path(
+    intersection: Intersection, movement: Movement, exit_arm: int, enters: End, leaves: End
+) -> Path:
+    (start, heading_in), (end, heading_out) = enters, leaves
+    entry, origin = intersection.approach_length, movement.origin
 
     # Clockwise turn: 0 for straight on, positive to the right.
-    turn = 2.0 * _half_angle(intersection, movement) - math.pi
-    mirrored = _mirrored(intersection, movement)
+    turn = 2.0 * _half_angle(intersection, origin, exit_arm) - math.pi
+    mirrored = _mirrored(intersection, origin, exit_arm)
     straight = mirrored and abs(turn) < STRAIGHT
-    radius = math.inf if straight else smallest_radius(intersection, movement)
-    t = np.linspace(0.0, 1.0, ARC_SEGMENTS + 1)[:, None]
+    radius = math.inf if straight else _smallest_radius(intersection, origin, exit_arm)
     if intersection.ways is not None:
         way = intersection.ways[intersection.index(movement)]
         length, points = way.length, way.resampled(ARC_SEGMENTS + 1)
     elif straight:
-        length, points = float(np.linalg.norm(end - start)), start + (end - start) * t
+        length, points = float(np.linalg.norm(end - start)), start + (end - start) * SHARES
     elif not mirrored or radius < MIN_PATH_RADIUS - 1e-9:  # too tight only if it is not allowed
-        points, length, radius = _curve(intersection, movement)
+        points, length, radius = _curve(enters, leaves)
     else:
-        length, angle = radius * abs(turn), t * abs(turn)
+        length, angle = radius * abs(turn), SHARES * abs(turn)
         inward = math.copysign(1.0, turn) * (1.0 - np.cos(angle))
         left_in = np.array([-heading_in[1], heading_in[0]])
         points = start + radius * (np.sin(angle) * heading_in - inward * left_in)
         points[-1] = end
-    roads = [length - intersection.junction_radius for length in intersection.lengths]
+    before, behind = (intersection.lengths[arm] - intersection.junction_radius
+                      for arm in (origin, exit_arm))  # fmt: skip
     return Path(
-        movement, exit_arm, entry=entry, exit=entry + length,
-        length=entry + length + roads[exit_arm], radius=radius, points=points,
-        heading_in=heading_in, heading_out=heading_out, start=entry - roads[movement.origin],
+        movement, exit_arm, entry=entry, exit=entry + length, length=entry + length + behind,
+        radius=radius, points=points, heading_in=heading_in, heading_out=heading_out,
+        start=entry - before,
     )  # fmt: skip
 
 
-def _half_angle(intersection: Intersection, movement: Movement) -> float:
+def _half_angle(intersection: Intersection, origin: int, exit_arm: int) -> float:
     """Half the clockwise angle from the arm of origin to the arm of exit [rad]."""
     bearings = intersection.bearings
-    to = bearings[intersection.exit_arm(movement)]
-    return math.radians((to - bearings[movement.origin]) % 360.0) / 2.0
+    return math.radians((bearings[exit_arm] - bearings[origin]) % 360.0) / 2.0
 
 
-def _mirrored(intersection: Intersection, movement: Movement) -> bool:
+def _mirrored(intersection: Intersection, origin: int, exit_arm: int) -> bool:
     """Whether the lanes mirror each other, so that one arc joins them."""
-    offsets = intersection.offsets
-    return offsets[movement.origin] == offsets[intersection.exit_arm(movement)]
+    return intersection.offsets[origin] == intersection.offsets[exit_arm]
 
 
-def _ends(intersection: Intersection, movement: Movement) -> tuple[Floats, Floats, Floats, Floats]:
-    """Position and unit heading at the entry, and at the exit."""
-    exit_arm, arms = intersection.exit_arm(movement), intersection.arms
-    heading_in = -np.array(arms[movement.origin].outward)
-    heading_out = np.array(arms[exit_arm].outward)
-    left_in, left_out = (np.array([-y, x]) for x, y in (heading_in, heading_out))
+def _entry(intersection: Intersection, arm: int) -> End:
+    """Where the approach lane of an arm ends."""
+    heading = -np.array(intersection.arms[arm].outward)
+    return _beside(intersection, arm, -heading * intersection.junction_radius, heading), heading
+
+
+def _exit(intersection: Intersection, arm: int) -> End:
+    """Where the exit lane of an arm begins."""
+    heading = np.array(intersection.arms[arm].outward)
+    return _beside(intersection, arm, heading * intersection.junction_radius, heading), heading
+
+
+def _beside(intersection: Intersection, arm: int, axis: Floats, heading: Floats) -> Floats:
+    """The middle of the lane that leads along `heading`, beside a point of its road's axis."""
     keep = 1.0 if intersection.side == "left" else -1.0
-    offset, offset_out = (keep * intersection.offsets[k] for k in (movement.origin, exit_arm))
-    start = -heading_in * intersection.junction_radius + left_in * offset
-    end = heading_out * intersection.junction_radius + left_out * offset_out
-    return start, heading_in, end, heading_out
+    left = np.array([-heading[1], heading[0]])
+    return np.asarray(axis + left * (keep * intersection.offsets[arm]))
 
 
-def _curve(intersection: Intersection, movement: Movement) -> Curve:
-    return join(*_ends(intersection, movement), ARC_SEGMENTS + 1)
+def _curve(enters: End, leaves: End) -> Curve:
+    return join(*enters, *leaves, ARC_SEGMENTS + 1)

@@ -23,7 +23,9 @@ JAM_SPEED: Final = 5.0 / 3.6
 JAM_TIME: Final = 1.0
 
 #: One that has stood stays in the queue up to this speed [m/s], so that it does not leave whenever
-#: it moves up: the end of the queue condition of PTV Vissim's queue counters, by default 10 km/h.
+#: it moves up. The rule is that of PTV Vissim's queue counters (PTV Vissim 2024, help, "Showing
+#: results of queue counters in lists": Begin, End). Their default is said to be 10 km/h; the help
+#: that we could read gives no number, and our 10 km/h is twice `JAM_SPEED`.
 QUEUE_END: Final = 10.0 / 3.6
 
 #: The first vehicle of a queue with a saturation headway: those before it are still starting up

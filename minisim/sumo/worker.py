@@ -101,7 +101,7 @@ class Worker:
         while goes_on and self._tick < job.horizon and not self._done:
             if job.stop_on_collision and self._collisions:
                 break
-            woken = passed or self._tick >= self._alarm.tick
+            woken = (passed and self._tick >= self._alarm.heeds) or self._tick >= self._alarm.tick
             if woken or self._tick >= self._pause or len(self._collisions) > self._told:
                 goes_on = self._ask(woken)
                 if not goes_on:

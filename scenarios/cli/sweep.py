@@ -89,6 +89,7 @@ def sweep(
     from scenarios.cli.shared.report import sweep_notes, sweep_table
     from scenarios.sweep.cells import cells
     from scenarios.sweep.cluster import cluster
+    from scenarios.sweep.processes import start_server
     from scenarios.sweep.store import Store
 
     if seeds is not None:
@@ -102,6 +103,8 @@ def sweep(
     if export is not None:
         check_table(export)
     experiments = _experiments(what, seeds, horizon)
+    if workers > 1 and scheduler is None:
+        start_server()  # before a bar has a thread
     options.say_replaced(recipe.scenario for recipe in experiments)
     remote = nullcontext() if scheduler is None else cluster(scheduler)
     with remote as executor, Store(out) as store:

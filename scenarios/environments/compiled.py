@@ -64,7 +64,7 @@ def step_all(
         if ticks[w] < targets[w]:
             ticks[w], reasons[w], _, _ = advance(
                 floats[w], ints[w], vehicles[w], lanes[w], layout, law, None,
-                trace, bodies, observed, 0, ticks[w], targets[w],
+                trace, bodies, observed, 0, ticks[w], targets[w], 0,
             )  # fmt: skip
             early += ticks[w] < targets[w]
     return early

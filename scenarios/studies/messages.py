@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import product
 from typing import TYPE_CHECKING, NamedTuple
 
-from scenarios.controllers import controller_named, label_of
+from scenarios.controllers import CONTROLLERS, FAMILIES, RADIO, controller_named, label_of
 from scenarios.library import four_way
 from scenarios.recipe import Recipe
 from scenarios.studies.fair import GATES, Crossing, crossing, paired_differences
@@ -14,8 +14,8 @@ from scenarios.studies.shared.study import TOTAL_DELAY, Results, Study, with_tot
 if TYPE_CHECKING:
     import pandas as pd
 
-#: The controllers that send messages.
-TALKING = ("v2ic", "reservation")
+#: The controllers that send messages, as they are by default.
+TALKING = tuple(name for name in FAMILIES[RADIO] if name in CONTROLLERS)
 #: Demands: a moderate one, and one at which every controller still has room [veh/h/lane].
 DENSITIES = (150.0, 250.0)
 #: Shares of messages lost, if the others come at once.

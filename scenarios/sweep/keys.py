@@ -22,7 +22,7 @@ from scenarios.recipe import Recipe
 
 #: Raise it by one when recipes give different rows while the version of the package stays the same.
 #: Stored rows are then computed again.
-RESULTS = 9
+RESULTS = 10
 
 #: Packages whose changes `RESULTS` counts.
 OURS = ("minisim", "dim", "baselines", "scenarios")
@@ -45,7 +45,9 @@ def key_of(recipe: Recipe) -> str:
 
 def content_of(recipe: Recipe) -> str | None:
     """A digest of all but label, seed and recorded arrivals; None if it cannot be described."""
-    scenario = replace(recipe.scenario, recorded=None)
+    scenario = recipe.scenario
+    if scenario.recorded is not None:
+        scenario = replace(scenario, recorded=None)
     try:
         return digest_of(json.dumps(canonical([scenario, recipe.driven])))[:16]
     except InputError:
@@ -67,7 +69,7 @@ def canonical(value: object) -> Any:
     """
     if value is None or isinstance(value, bool | str):
         return value
-    if isinstance(value, Integral | Real):
+    if type(value) is float or isinstance(value, Integral | Real):  # the first is faster
         number = float(value)
         return number + 0.0 if number == value or math.isnan(number) else str(value)  # no -0.0
     if isinstance(value, np.ndarray) and value.dtype.kind in "biufU":
@@ -75,9 +77,10 @@ def canonical(value: object) -> Any:
         digest = hashlib.sha256(plain.tobytes()).hexdigest()
         return {"array": plain.dtype.str, "shape": list(plain.shape), "sha256": digest}
     kind: Any = type(value)
-    versioned = isinstance(getattr(kind, "version", None), str | int)
-    if is_dataclass(kind) or (versioned and hasattr(value, "__dict__")):
-        named = [field.name for field in fields(kind)] if is_dataclass(kind) else vars(value)
+    named = _fields(kind)
+    if named is None and isinstance(getattr(kind, "version", None), str | int):
+        named = tuple(vars(value)) if hasattr(value, "__dict__") else None
+    if named is not None:
         told = {name: canonical(getattr(value, name)) for name in named}
         return {"class": f"{kind.__module__}.{kind.__qualname__}", **_code(kind), **told}
     if inspect.isfunction(value):
@@ -100,6 +103,12 @@ def canonical(value: object) -> Any:
         "parameters are unknown; make it a frozen dataclass, whose fields are numbers, texts, "
         "functions, arrays, other dataclasses, and collections of them, or give it a `version`"
     )
+
+
+@cache
+def _fields(kind: type) -> tuple[str, ...] | None:
+    """Names of the fields of a dataclass; None of another class."""
+    return tuple(field.name for field in fields(kind)) if is_dataclass(kind) else None
 
 
 def _rule(function: FunctionType) -> str:

@@ -1,8 +1,9 @@
 """An executor of processes, each of which is at work at once and ends with this one.
 
-They are forked from a server: a process that is spawned once and has loaded what runs need. Forking
-this process itself could hang beside the threads of a progress bar. Requests reach the server by a
-socket without a name, so no file can be left behind, nor can its path be too long, as that of
+They are forked from a server, a process that has loaded what runs need. It is a fork of this one if
+that has no other threads: a fork could hang where a thread, such as that of a progress bar, held a
+lock. Otherwise it is spawned, which takes most of a second. Requests reach it by a socket without a
+name, so no file can be left behind, nor can its path be too long, as that of
 `multiprocessing.forkserver` can. Where forking is unsafe, each process is spawned.
 
 `ProcessPoolExecutor`, loky and pebble cannot replace this. With the last two, a busy worker
@@ -14,6 +15,7 @@ from __future__ import annotations
 import gc
 import os
 import pickle
+import re
 import signal
 import socket
 import sys
@@ -26,14 +28,18 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
 from multiprocessing import Pipe, get_context
 from multiprocessing.connection import Connection
-from multiprocessing.resource_tracker import ensure_running
+from multiprocessing.resource_tracker import ensure_running, getfd
 from multiprocessing.util import Finalize
+from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
 from minisim.errors import ExecutorError
 
 #: Whether workers are forked from a server. Apple's libraries do not survive a fork.
 FORKS = hasattr(os, "fork") and sys.platform != "darwin"
+
+#: What Python says of a fork beside threads that it has not made.
+MULTI_THREADED = "This process .* is multi-threaded"
 
 #: How many times a worker is asked to end, once per second, before it is killed.
 PATIENCE = 10
@@ -56,6 +62,9 @@ class Processes(ThreadPoolExecutor):
 
     def __init__(self, jobs: int) -> None:
         super().__init__(jobs)
+        start_server()  # before there are threads
+        for server in _SERVERS.values():
+            server.used = True
         self._idle: deque[Connection] = deque()
         self._leash, self._hand = Pipe(duplex=False)
         Finalize(self, self._hand.close, exitpriority=1)
@@ -181,8 +190,11 @@ class _Server:
 
     def __init__(self) -> None:
         self.control, its_end = socket.socketpair()
-        process = get_context("spawn").Process(target=_serve, args=(its_end,))
-        with its_end:
+        self.forked, self.used = _has_one_thread(), False
+        with its_end, warnings.catch_warnings():
+            warnings.filterwarnings("ignore", MULTI_THREADED, DeprecationWarning)
+            method = get_context("fork") if self.forked else get_context("spawn")
+            process = method.Process(target=_serve, args=(its_end, self.forked))
             process.start()
         self.stop = Finalize(self, _terminate, (process, self.control), exitpriority=1)
 
@@ -190,6 +202,16 @@ class _Server:
         """Let it end after its last request."""
         self.stop.cancel()
         self.control.close()
+
+
+def _has_one_thread() -> bool:
+    """Whether no other thread can hold a lock; those of OpenBLAS do not outlive a fork."""
+    if threading.active_count() > 1:
+        return False
+    try:  # OpenMP waits in vain for its threads after a fork
+        return re.search(r"/lib[gi]?omp", Path("/proc/self/maps").read_text()) is None
+    except OSError:
+        return False
 
 
 def _terminate(process: Any, control: socket.socket) -> None:
@@ -214,6 +236,16 @@ def _server(*, anew: bool = False) -> _Server:
     return _SERVERS[where]
 
 
+def start_server() -> None:
+    """Start the server of the next pool now, which is quicker while there is no other thread.
+
+    A fork serves one pool: it knows no class that its parent has defined since.
+    """
+    if FORKS:
+        with _LOCK, interrupts_blocked(), suppress(OSError, RuntimeError):  # the first task tells
+            _server(anew=any(it.forked and it.used for it in _SERVERS.values()))
+
+
 def _stop_server() -> None:
     with _LOCK:
         for server in _SERVERS.values():
@@ -221,13 +253,16 @@ def _stop_server() -> None:
         _SERVERS.clear()
 
 
-def _serve(control: socket.socket) -> None:
+def _serve(control: socket.socket, forked: bool) -> None:
     """Become a worker in a fork for each pair of handles that comes; end when the parent does."""
+    if forked:
+        _close_all_but(control.fileno(), getfd() or 0)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
     _load()
     gc.freeze()  # or the first collection of each fork would copy all of it
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # no one asks how forks ended
-    warnings.filterwarnings("ignore", "This process .* is multi-threaded", DeprecationWarning)
+    warnings.filterwarnings("ignore", MULTI_THREADED, DeprecationWarning)
     while handles := socket.recv_fds(control, 1, 2)[1]:
         if os.fork() == 0:
             control.close()
@@ -236,6 +271,14 @@ def _serve(control: socket.socket) -> None:
             return
         for handle in handles:
             os.close(handle)
+
+
+def _close_all_but(*kept: int) -> None:
+    """Close what a fork has of its parent: the other end of a pipe would never be told the end."""
+    lowest = 3
+    for handle in (*sorted(kept), os.sysconf("SC_OPEN_MAX")):
+        os.closerange(lowest, handle)
+        lowest = handle + 1
 
 
 def _load() -> None:

@@ -63,9 +63,9 @@ class Page:
             raise AssertionError(answer["exceptionDetails"]["exception"].get("description"))
         return answer["result"].get("value")
 
-    def until(self, script: str) -> None:
-        """Wait until an expression is true."""
-        end = time.monotonic() + PATIENCE
+    def until(self, script: str, patience: float = PATIENCE) -> None:
+        """Wait until an expression is true, so many seconds at most."""
+        end = time.monotonic() + patience
         while time.monotonic() < end:
             if self.run(f"Boolean({script})"):
                 return

@@ -11,6 +11,8 @@ from pathlib import Path
 import pytest
 
 from figures.player.lab import LabServer, answered, lab_page
+from minisim.parameters import parameters
+from scenarios.lab import Setting
 from tests import ROOT
 from tests.browser.chromium import Browser, Page, browser_path, chromium
 
@@ -103,28 +105,59 @@ def test_a_wrong_value_in_an_address_is_told(browser: Browser, lab: LabServer) -
 def test_the_play_button_is_in_view(
     browser: Browser, lab: LabServer, window: tuple[int, int]
 ) -> None:
-    shown = opened(browser, lab, "seconds=60&arms=5&gate=harmonious", window)
+    setting = "seconds=60&arms=5&gate=harmonious&beside=adaptive"
+    shown = opened(browser, lab, setting, window)
     shown.until(EXPLAINED)
     box = shown.run(f"{PLAYER}.shadowRoot.querySelector('.play').getBoundingClientRect().toJSON()")
     assert 0 <= box["left"] < box["right"] <= window[0]
     assert 0 <= box["top"] < box["bottom"] <= window[1]
     assert shown.run("document.documentElement.scrollWidth") <= window[0]
-    picture = shown.run(f"{PLAYER}.panes[0].canvas.getBoundingClientRect().toJSON()")
-    assert picture["bottom"] <= box["top"], "the controls do not cover the picture"
+    for pane in (0, 1):
+        picture = shown.run(f"{PLAYER}.panes[{pane}].canvas.getBoundingClientRect().toJSON()")
+        assert picture["bottom"] <= box["top"], "the controls do not cover the picture"
 
 
-def test_an_export_is_a_download(browser: Browser, lab: LabServer, tmp_path: Path) -> None:
-    shown = opened(browser, lab, "seconds=60&density=200")
+#: A value of each control that is not its default.
+OTHERS = {
+    "controller": "adaptive", "beside": "reservation", "arms": 5, "density": 210, "gate": "passed",
+    "humans": 0.25, "error": 0.1, "profile": "fair", "seed": 7, "seconds": 90,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", [it.name for it in parameters(Setting)])
+def test_each_control_is_in_the_address_and_simulates(
+    browser: Browser, lab: LabServer, name: str
+) -> None:
+    shown = opened(browser, lab, "seconds=60")
+    shown.until(EXPLAINED)
+    before = shown.run(f"JSON.stringify({PLAYER}.panes.map((it) => it.scene.data))")
+    put(shown, name, OTHERS[name])
+    shown.until(f"location.hash.includes('{name}={OTHERS[name]}')")
+    shown.until(f"""{EXPLAINED} && !document.getElementById('state').textContent.includes('simul')
+      && JSON.stringify({PLAYER}.panes.map((it) => it.scene.data)) !== {json.dumps(before)}""")
+    known = Setting.read(shown.run("location.hash.slice(1)"))
+    assert str(getattr(known, name)).removesuffix(".0") == str(OTHERS[name])
+    assert shown.run("document.getElementById('command').textContent") == known.command
+    assert shown.errors == []
+
+
+@pytest.mark.parametrize(("file", "begins"), [
+    ("film.html", b"<!doctype html>"), ("film.gif", b"GIF89a"),
+    ("scene.json", b'{"format":"minisim scene"'),
+])  # fmt: skip
+def test_an_export_is_a_download(
+    browser: Browser, lab: LabServer, tmp_path: Path, file: str, begins: bytes
+) -> None:
+    shown = opened(browser, lab, "seconds=30&density=400")
     shown.until(EXPLAINED)
     shown.ask("Page.setDownloadBehavior", behavior="allow", downloadPath=str(tmp_path))
-    shown.run("document.querySelector('[data-as=\"scene.json\"]').click()")
-    shown.until("!document.getElementById('state').textContent.startsWith('making')")
-    shown.until("true")
+    shown.run(f"""document.querySelector('[data-as="{file}"]').click()""")
+    shown.until("!document.getElementById('state').textContent.startsWith('making')", 120.0)
     for _ in range(100):
-        if (tmp_path / "scene.json").exists():
+        if (tmp_path / file).exists():
             break
         shown.run("new Promise((done) => setTimeout(done, 20))")
-    assert (tmp_path / "scene.json").read_text().startswith('{"format":"minisim scene"')
+    assert (tmp_path / file).read_bytes().startswith(begins)
 
 
 def test_in_a_notebook_the_kernel_answers(browser: Browser, tmp_path: Path) -> None:

@@ -140,6 +140,18 @@ def test_everything_in_every_window(
       return new Set(places.map((at) => data.slice(at, at + 3).join())).size;
     }})()"""
     assert shown.run(inked) > 5, "a picture, not one colour"
+    legend = f"{PART}('.legend')"
+    if width >= 1000:
+        assert shown.run(f"{legend}.scrollHeight <= {legend}.clientHeight"), "the legend is whole"
+    shown.run(f"{PLAYER}.time = {START + SECONDS / 2}")
+    sizes = f"""[...{PLAYER}.shadowRoot.querySelectorAll('.graph text')].map((it) =>
+      it.getScreenCTM().a * parseFloat(getComputedStyle(it).fontSize))"""
+    assert min(shown.run(sizes)) >= 10, "pixels of the graph's text"
+    kerbs = f"""{PLAYER}.panes.flatMap(({{ scene }}) => scene.ground.holds.map((it, lane) => {{
+      const [ux, uy] = scene.ways.find((way) => way.lane === lane).in;
+      return scene.kerb * ((it[2] - it[0]) * uy - (it[3] - it[1]) * ux);
+    }}))"""
+    assert min(shown.run(kerbs)) > 0, "hold lines, and thus signals, end at the kerb"
     at_rest(shown, files[name])
 
 
@@ -258,6 +270,17 @@ def test_two_runs_share_the_clock_and_the_choice(
     for run, text in zip(runs, said, strict=True):
         assert text.startswith(run.why(both, 75.0).sentence)
     assert shown.run(f"{PLAYER}.panes.map((it) => it.name.textContent)") == ["dim", "fixed-time"]
+
+
+@pytest.mark.slow
+def test_in_a_page_as_wide_as_the_site_both_runs_say_why_beside_each_other(
+    browser: Browser, files: dict[str, Path]
+) -> None:
+    shown = opened(browser, files["two"], (880, HEIGHTS[1]))
+    for part in ("canvas", "panel"):
+        one, other = shown.run(f"{PLAYER}.panes.map((it) => it.{part}.getBoundingClientRect().top)")
+        assert one == other < HEIGHTS[1] - 200
+    at_rest(shown, files["two"])
 
 
 @pytest.mark.slow

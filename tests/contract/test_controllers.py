@@ -319,6 +319,7 @@ def test_valid_commands_pass() -> None:
     valid = (
         Go(3), Hold(9), Open(0), Close(3), Advise(9, 0.0), Advise(3, math.inf), Brake(3, 4.5),
         Brake(9, 0.0), Accelerate(3, -2.0), Accelerate(9, math.inf), Wake(10.1),
+        Wake(12.0, undisturbed=12.0), Wake(12.0, undisturbed=9.0),
     )  # fmt: skip
     check_commands(valid, VIEW, small_scenario(4).site(0))
 
@@ -330,6 +331,7 @@ def test_valid_commands_pass() -> None:
         Brake(4, 1.0), Brake(3, -1.0), Brake(3, math.nan), Brake(3, math.inf),
         Accelerate(4, 1.0), Accelerate(3, math.nan), Accelerate(3, -math.inf),
         Wake(10.0), Wake(math.nan), Wake(math.inf), (3,), None,
+        Wake(12.0, undisturbed=12.1), Wake(12.0, undisturbed=math.nan),
     ],
 )  # fmt: skip
 def test_invalid_commands_do_not(command: Any) -> None:

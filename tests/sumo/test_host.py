@@ -305,6 +305,22 @@ def test_wake_rings_once() -> None:
     assert [view.time for view in seen] == [0.0, 3.2]
 
 
+def test_vehicles_do_not_disturb_a_session_before_it_wants() -> None:
+    """From the very step on that it names, they do."""
+    scenario = replayed(FAIR_FOUR, (0.0, 0, 2), (0.0, 1, 1), (4.0, 2, 2), horizon=100.0)
+    plan = Plan(marks=(100.0, 30.0, 0.0), wake_on_clear=True, lanes_open=True)
+    for run in (minisim.simulate, simulate):
+        every: list[View] = []
+        run(scenario, timed({0.0: (Wake(90.0),)}, plan, every), on_collision="record")
+        times = [view.time for view in every]
+        assert len(times) > 8
+        for until in (times[4], times[4] + 0.05):
+            seen: list[View] = []
+            script = {0.0: (Wake(90.0, undisturbed=until),)}
+            run(scenario, timed(script, plan, seen), on_collision="record")
+            assert [view.time for view in seen] == [0.0, *(t for t in times if t >= until)]
+
+
 @pytest.fixture(scope="module")
 def busy(tmp_path_factory: pytest.TempPathFactory) -> tuple[Run, Run, Path]:
     """A queue that reaches back to the road entries, with unfinished and undeparted vehicles."""

@@ -20,7 +20,7 @@ from PIL import Image
 import minisim
 from baselines import FixedTime
 from dim import Dim, HarmonyMatrix, explain
-from figures import animation, crossval, decision, performance_figure, style, write_animation
+from figures import animation, crossval, decision, performance_figure, plots, style, write_animation
 from figures.film.animate import Picture, frame_times
 from figures.film.encode import COLOURS, palette_of, write_gif
 from figures.film.frames import RELEASED, Frames
@@ -496,3 +496,15 @@ def test_a_corridor_is_drawn_where_the_bodies_go() -> None:
         assert shapely.covers(shade.buffer(0.02), bodies).all()
         assert shade.area < 1.05 * shapely.union_all(bodies).area
     assert len(shades) == 2, "its shade and its outline"
+
+
+@pytest.mark.parametrize("densities", [(150, 350), (50, 100, 200, 800), (100,)])
+def test_series_stay_within_the_axes_side_by_side(densities: tuple[int, ...]) -> None:
+    rows = pd.DataFrame({"density": densities})
+    shifts = [plots.offset(rows, place, 5) for place in range(5)]
+    assert shifts == sorted(shifts)
+    axes = plots.panels(6.0, 4.5, 1)[1][0]
+    plots.density_axis(axes, densities)
+    low, high = axes.get_xlim()
+    room = min(min(densities) - low, high - max(densities))
+    assert max(map(abs, shifts)) < 0.5 * room

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import stat
 from concurrent.futures import ThreadPoolExecutor
 from itertools import product
@@ -47,6 +48,17 @@ def test_a_symbolic_link_keeps_pointing_to_the_file(tmp_path: Path) -> None:
     write_text(link, "new")
     assert link.is_symlink()
     assert real.read_text(encoding="utf-8") == "new"
+
+
+@pytest.mark.parametrize("link", [False, True])
+def test_the_folder_that_is_missing_is_named(link: bool, tmp_path: Path) -> None:
+    file = gone = tmp_path / "none" / "file.txt"
+    if link:
+        file = tmp_path / "link.txt"
+        file.symlink_to(gone)
+    for write in (lambda: write_text(file, "text"), lambda: check_file(gone)):
+        with pytest.raises(FileError, match=re.escape(f": there is no folder {gone.parent}") + "$"):
+            write()
 
 
 def test_a_table_is_read_back(tmp_path: Path) -> None:

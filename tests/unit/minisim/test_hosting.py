@@ -52,6 +52,15 @@ def test_the_earlier_of_both_rings() -> None:
     assert alarm.tick == 10
 
 
+def test_vehicles_wake_it_unless_it_wants_to_be_undisturbed() -> None:
+    alarm = Alarm(None, 0.1)
+    assert alarm.heeds == 0
+    alarm.set(Wake(1.0, undisturbed=0.75))
+    assert (alarm.tick, alarm.heeds) == (10, 8)
+    alarm.set(Wake(2.0))  # replaces all of the earlier one
+    assert (alarm.tick, alarm.heeds) == (20, 0)
+
+
 @pytest.mark.parametrize(
     ("window", "message"),
     [

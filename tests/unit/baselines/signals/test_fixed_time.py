@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import copy
-from dataclasses import replace
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -16,7 +17,7 @@ from baselines.signals.fixed_time import Program, Programs
 from baselines.signals.heads import Colour
 from baselines.signals.webster import MIN_GREEN, webster
 from minisim import simulate
-from minisim.control import View
+from minisim.control import Command, Session, Site, View, Wake
 from minisim.demand import DemandProfile, Period
 from minisim.errors import InputError
 from minisim.results.safety import safety_summary
@@ -24,7 +25,7 @@ from minisim.testing import drained, small_scenario
 from minisim.vehicle import VehicleType
 from scenarios import Scenario
 from scenarios.library import four_way
-from tests.builders import drive, replayed, said, seen
+from tests.builders import ScriptedSession, drive, replayed, said, seen
 
 SITE = four_way(density=250).site()
 
@@ -115,6 +116,43 @@ def test_no_cycle_drifts_by_more_than_a_step(dt: float) -> None:
         # At the first step that is less than half a step before its time.
         assert -dt / 2 - 1e-6 <= start - k * cycle <= dt + 1e-6
         assert -dt / 2 - 1e-6 <= end - (k * cycle + green) <= dt + 1e-6
+
+
+@dataclass(frozen=True)
+class Restless:
+    """A signal that every vehicle that clears the junction wakes."""
+
+    signal: FixedTime
+    name: str = "restless"
+
+    def start(self, site: Site) -> Session:
+        session = self.signal.start(site)
+
+        def decide(view: View) -> Iterable[Command]:
+            answer = session.decide(view)
+            return [Wake(it.time) if isinstance(it, Wake) else it for it in answer]
+
+        return ScriptedSession(session.plan, decide)
+
+
+@pytest.mark.parametrize("density", [150, 350])
+@pytest.mark.parametrize(
+    ("signal", "profile"),
+    [
+        (FixedTime(), "fair"),
+        (FixedTime(greens=7.04), "fair"),
+        (FixedTime(), "as_run_signals"),
+        (FixedTime(facing=True), "fair"),  # vehicles that turn are never left alone
+    ],
+)
+def test_it_misses_nothing_while_it_is_undisturbed(
+    signal: FixedTime, profile: str, density: float
+) -> None:
+    scenario = four_way(density, profile=profile, horizon=600.0)
+    ours, restless = (simulate(scenario, it, 2) for it in (signal, Restless(signal)))
+    assert ours.trips.equals(restless.trips)
+    asked = [run.exchange["decisions"] for run in (ours, restless)]
+    assert asked[0] == asked[1] if signal.facing else asked[0] < 0.8 * asked[1]
 
 
 @pytest.mark.parametrize(("early", "due"), [(1e-9, True), (0.04, True), (0.06, False)])

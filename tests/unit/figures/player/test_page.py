@@ -94,7 +94,9 @@ def test_the_player_has_the_look_of_the_figures() -> None:
     used = set(re.findall(r"var\(--([\w-]+)\)", text)) | set(
         re.findall(r'look\("([\w-]+)"\)', text)
     )
-    assert used - {"side", "full", "graph", "colour"} <= set(re.findall(r"--([\w-]+): #", text))
+    assert used - {"side", "full", "graph", "colour", "large", "small"} <= set(
+        re.findall(r"--([\w-]+): #", text)
+    )
 
 
 def test_runs_may_be_named_and_what_is_wrong_is_told(tmp_path: Path) -> None:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
+from typing import Any
+
 import numpy as np
 import pytest
 
 from minisim.arrivals import Arrivals
 from minisim.control import Plan, Site
-from minisim.engine.broad_phase import may_touch
+from minisim.engine.broad_phase import bodies_meet, may_touch
 from minisim.engine.collision import near_bodies, touching
 from minisim.engine.state import DRIVING, build_lanes, build_layout, build_vehicles
 from minisim.fleet import TYPES, Fleet
@@ -19,6 +22,24 @@ FLEET = Fleet(
     tuple(TYPES[name] for name in ("car", "bus", "bus-offtracking", "car-offtracking")),
     ((0.25,),) * 4,
 )
+
+
+def body(x: float, y: float, angle: float, length: float, width: float) -> Any:
+    """Centre, heading, and half of the length and width, as `embody` says."""
+    return np.array([x, y, math.cos(angle), math.sin(angle), length / 2.0, width / 2.0])
+
+
+@pytest.mark.parametrize(("apart", "meet"), [(-1e-3, True), (1e-3, False)])
+@pytest.mark.parametrize("shape", [(0.5, 0.5), (5.0, 1.8), (4.0, 4.0)])
+def test_corners_meet_whatever_the_shapes(
+    shape: tuple[float, float], apart: float, meet: bool
+) -> None:
+    """The corners of a long truck and a short body touch with their diagonals in one line."""
+    truck = 30.0, 2.5
+    reach = (math.hypot(*truck) + math.hypot(*shape)) / 2.0 + apart
+    angles = (-math.atan2(it[1], it[0]) for it in (truck, shape))
+    one, other = body(0.0, 0.0, next(angles), *truck), body(reach, 0.0, next(angles), *shape)
+    assert bodies_meet(one, other) == bodies_meet(other, one) == meet
 
 
 @pytest.mark.parametrize(

@@ -59,6 +59,24 @@ def test_worked_examples_of_all_way_stops() -> None:
     assert "".join(map(level_of_service, (12.1, 16.1, 15.3, 14.0))) == "BCCB"
 
 
+def test_worked_examples_of_two_way_stops() -> None:
+    """Example problems 1 and 3 for two-way stops of the same manual, chapter 32, as transcribed
+    there (tests/chapter20_integration.rs): movement 4 and the approach that stops; movements 1
+    and 4 and both approaches. The last two are WBL and NBR in exhibit 3-30 of the Guidebook."""
+    assert "".join(map(level_of_service, (8.3, 14.9))) == "AB"
+    assert "".join(map(level_of_service, (8.4, 8.2, 18.3, 15.6))) == "AACC"
+    assert "".join(map(level_of_service, (67.0, 464.0))) == "FF"
+
+
+def test_worked_examples_of_roundabouts_which_have_the_same_limits() -> None:
+    """Example problems 1 and 2 for roundabouts of the same manual, chapter 33, as transcribed there
+    (tests/chapter22_integration.rs): lanes, approaches, then the whole junction."""
+    one = (22.6, 14.0, 0.0, 22.0, 26.8, 20.2, 23.3, 4.7, 17.5)
+    assert "".join(map(level_of_service, one)) == "CBACDCCAC"
+    two = (11.8, 13.0, 14.6, 14.0, 16.1, 8.8, 7.8, 15.1, 12.3)
+    assert "".join(map(level_of_service, two)) == "BBBBCAACB"
+
+
 @pytest.mark.parametrize("name", safe())
 def test_signals_are_graded_as_signals_and_all_others_as_unsignalised(name: str) -> None:
     run = simulate(four_way(250, profile="fair", horizon=60.0), controller_named(name))

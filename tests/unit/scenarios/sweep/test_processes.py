@@ -7,11 +7,13 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 from pickle import PicklingError
+from types import SimpleNamespace
 from typing import NoReturn
 
 import pytest
@@ -79,9 +81,11 @@ def test_a_dead_process_costs_its_own_task(monkeypatch: pytest.MonkeyPatch, fork
 
 
 @needs_server
-def test_a_server_serves_many_pools_in_the_same_surroundings(
+def test_a_spawned_server_serves_many_pools_in_the_same_surroundings(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
+    monkeypatch.setattr(processes, "_has_one_thread", lambda: False)
+
     def asked(*task: object) -> object:
         with Processes(1) as pool:
             return pool.submit(*task).result()  # type: ignore[arg-type]
@@ -123,9 +127,13 @@ def test_nothing_is_left_in_a_long_temporary_folder(tmp_path: Path) -> None:
     assert not list(long.iterdir())
 
 
+#: Keeps a script from being forked, as the thread of a notebook does.
+THREAD = "import threading\nthreading.Thread(target=threading.Event().wait, daemon=True).start()\n"
+
+
 def test_a_script_without_a_guard_is_told_so(tmp_path: Path) -> None:
     script = tmp_path / "script.py"
-    script.write_text(SWEEPS.replace('if __name__ == "__main__":', "if True:"))
+    script.write_text(THREAD + SWEEPS.replace('if __name__ == "__main__":', "if True:"))
     done = python(str(script))
     assert done.stdout == ""
     own, _, parent = done.stderr.rpartition("Traceback")
@@ -133,7 +141,7 @@ def test_a_script_without_a_guard_is_told_so(tmp_path: Path) -> None:
     assert 'under `if __name__ == "__main__":`' in parent
 
 
-#: As a notebook's class, it is in no file.
+#: As a notebook's class, it is in no file; and it changes between two sweeps.
 UNKNOWN = """
 from dataclasses import dataclass
 from minisim.control import Unregulated
@@ -141,21 +149,63 @@ from scenarios import three_way
 from scenarios.recipe import Recipe
 from scenarios.sweep import sweep
 
-@dataclass(frozen=True)
-class Mine(Unregulated):
-    version = 1
+for new in (False, True):
+    @dataclass(frozen=True)
+    class Mine(Unregulated):
+        version = 1
 
-rows = sweep([Recipe(three_way(0, horizon=1), Mine(), seed) for seed in (1, 2)], jobs=2)
-print(*rows["error"], sep="\\n")
+        def start(self, site, new=new):
+            if new:
+                raise ValueError("the new one")
+            return super().start(site)
+
+    rows = sweep([Recipe(three_way(0, horizon=1), Mine(), seed) for seed in (1, 2)], jobs=2)
+    print(*rows["error"], sep="\\n")
 """
 
 
 def test_a_class_that_other_processes_do_not_know_fails_its_runs() -> None:
+    done = python("-c", THREAD + UNKNOWN)
+    assert done.stderr == ""
+    assert len(set(done.stdout.splitlines())) == 1
+    assert "Can't get attribute 'Mine'" in done.stdout
+
+
+@needs_server
+def test_a_fork_knows_the_latest_class_of_this_process() -> None:
     done = python("-c", UNKNOWN)
     assert done.stderr == ""
-    first, second = done.stdout.splitlines()
-    assert first == second
-    assert "Can't get attribute 'Mine'" in first
+    first, second, *changed = done.stdout.splitlines()
+    assert (first, second) == ("None", "None")
+    assert len(changed) == 2
+    assert all("the new one" in it for it in changed)
+
+
+#: Has an end of a pipe while it sweeps: a fork that kept it would never let its reader end.
+WITH_A_PIPE = """
+import os, subprocess, sys
+from scenarios.sweep.processes import Processes
+
+with subprocess.Popen(["cat"], stdin=subprocess.PIPE) as reader, Processes(1) as pool:
+    child = pool.submit(os.getpid).result() != os.getpid()
+    reader.stdin.close()
+    print(child, reader.wait(10))
+"""
+
+
+@needs_server
+def test_a_fork_keeps_no_pipe_of_this_process_open() -> None:
+    assert python("-c", WITH_A_PIPE).stdout == "True 0\n"
+
+
+@needs_server
+@pytest.mark.parametrize(("maps", "forks"), [("/lib/libgomp.so.1", False), ("/lib/libm.so", True)])
+def test_a_process_with_openmp_is_not_forked(
+    monkeypatch: pytest.MonkeyPatch, maps: str, forks: bool
+) -> None:
+    monkeypatch.setattr(threading, "active_count", lambda: 1)
+    monkeypatch.setattr(processes, "Path", lambda _: SimpleNamespace(read_text=lambda: maps))
+    assert processes._has_one_thread() == forks
 
 
 #: Gives up while its server loads.
