@@ -352,7 +352,7 @@ def test_wrong_actions_are_told(make: str, actions: list[Any]) -> None:
 @pytest.mark.parametrize("make", ["RightOfWayEnv", "VehiclesEnv"])
 def test_an_environment_can_be_kept_and_copied(make: str) -> None:
     """As a pickle and by deepcopy, in the middle of an episode."""
-    env = getattr(environments, make)(short(60.0, density=500.0))
+    env = getattr(environments, make)(short(120.0, density=500.0))
     env.reset(seed=3)
 
     def on(it: Any, steps: int) -> list[float]:
