@@ -15,8 +15,6 @@ from scenarios.statistics import mean_interval
 
 #: Generations over which the course is averaged; each has arrivals of its own.
 SMOOTHED = 10
-#: Markers of one demand stand side by side, this far apart: none hides another [veh/h/lane].
-ASIDE = 9.0
 
 
 def learning_figure(training: Training, rows: pd.DataFrame) -> Figure:
@@ -36,7 +34,7 @@ def learning_figure(training: Training, rows: pd.DataFrame) -> Figure:
     names = list(dict.fromkeys(rows["controller"]))
     for place, name in enumerate(names):
         cells = list(rows[rows["controller"] == name].groupby("density"))
-        aside = ASIDE * (place - (len(names) - 1) / 2.0)
+        aside = plots.offset(rows, place, len(names))
         x = [float(str(density)) + aside for density, _ in cells]
         found = [plots.mean_estimate(cell[DELAY.name]) for _, cell in cells]
         plots.draw_line(right, x, found, style.look(name))
