@@ -80,7 +80,7 @@ def test_where_the_least_delay_is_not_known_it_says_why(
     def refuse(*_: object) -> float:
         raise InputError("more than 0 states at once")
 
-    monkeypatch.setattr(optimum, "_bound", refuse)
+    monkeypatch.setattr(optimum, "_least", refuse)
     file = tmp_path / "small.toml"
     file.write_text(SMALL.replace("seeds = 2", "seeds = [5]"))
     with Store(tmp_path / "s.sqlite") as store:
