@@ -27,7 +27,8 @@ def elsewhere() -> Iterator[Callable[[Sequence[tuple[_Function, Any]]], None]]:
     started: list[subprocess.Popen[bytes]] = []
 
     def begin(jobs: Sequence[tuple[_Function, Any]]) -> None:
-        if jobs and sys.executable and cores() > 1:
+        interpreter = sys.executable and not getattr(sys, "frozen", False)
+        if jobs and interpreter and cores() > 1:
             with suppress(OSError):
                 started.append(_started(jobs))
 

@@ -255,7 +255,9 @@ def _stop_server() -> None:
 
 def _serve(control: socket.socket, forked: bool) -> None:
     """Become a worker in a fork for each pair of handles that comes; end when the parent does."""
+    global _LOCK
     if forked:
+        _LOCK = threading.Lock()  # its parent holds the other one
         _close_all_but(control.fileno(), getfd() or 0)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)

@@ -281,6 +281,7 @@ print(answer(10.0), rule(2.0), "kept" if rule.stats.cache_hits else "compiled")
 
 FAILURES = {
     "one core": "import minisim.apart; minisim.apart.cores = lambda: 1\n",
+    "a frozen application": "import sys; sys.frozen = True\n",
     "no interpreter": "import sys; sys.executable = None\n",
     "another process that fails": "import sys; sys.executable = '/bin/false'\n",
     "another process that is never there": "import sys; sys.executable = '/no/python'\n",

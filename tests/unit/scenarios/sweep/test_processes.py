@@ -181,6 +181,27 @@ def test_a_fork_knows_the_latest_class_of_this_process() -> None:
     assert all("the new one" in it for it in changed)
 
 
+#: A run that has processes of its own.
+NESTED = """
+from scenarios.sweep.processes import Processes
+
+def nested():
+    with Processes(1) as inner:
+        return inner.submit(abs, -3).result()
+
+if __name__ == "__main__":
+    with Processes(1) as pool:
+        print(pool.submit(nested).result(timeout=60))
+"""
+
+
+def test_a_process_may_have_a_pool_of_its_own(tmp_path: Path) -> None:
+    script = tmp_path / "nested.py"
+    script.write_text(NESTED)
+    done = python(str(script))
+    assert (done.stdout, done.stderr) == ("3\n", "")
+
+
 #: Has an end of a pipe while it sweeps: a fork that kept it would never let its reader end.
 WITH_A_PIPE = """
 import os, subprocess, sys
