@@ -15,18 +15,19 @@ from contextlib import contextmanager, suppress
 from importlib import import_module
 from typing import Any, TypeAlias
 
-_Function: TypeAlias = Callable[..., object]
+#: A function that numba compiles.
+Function: TypeAlias = Callable[..., object]
 
 #: The process that compiles a function, by the function's name.
 _UNDER_WAY: dict[str, subprocess.Popen[bytes]] = {}
 
 
 @contextmanager
-def elsewhere() -> Iterator[Callable[[Sequence[tuple[_Function, Any]]], None]]:
+def elsewhere() -> Iterator[Callable[[Sequence[tuple[Function, Any]]], None]]:
     """Gives a function that has others compiled, for the argument types that stand beside them."""
     started: list[subprocess.Popen[bytes]] = []
 
-    def begin(jobs: Sequence[tuple[_Function, Any]]) -> None:
+    def begin(jobs: Sequence[tuple[Function, Any]]) -> None:
         interpreter = sys.executable and not getattr(sys, "frozen", False)
         if jobs and interpreter and cores() > 1:
             with suppress(OSError):
@@ -42,7 +43,7 @@ def elsewhere() -> Iterator[Callable[[Sequence[tuple[_Function, Any]]], None]]:
                 pass
 
 
-def wait_for(function: _Function) -> None:
+def wait_for(function: Function) -> None:
     """Wait until a second process has compiled `function`, or has failed, if one is about to."""
     process = _UNDER_WAY.pop(_name(function), None)
     if process is None or process.stdout is None:
@@ -52,7 +53,7 @@ def wait_for(function: _Function) -> None:
             break
 
 
-def _started(jobs: Sequence[tuple[_Function, Any]]) -> subprocess.Popen[bytes]:
+def _started(jobs: Sequence[tuple[Function, Any]]) -> subprocess.Popen[bytes]:
     process = subprocess.Popen(
         [sys.executable, "-m", __name__], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL, env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
@@ -64,7 +65,7 @@ def _started(jobs: Sequence[tuple[_Function, Any]]) -> subprocess.Popen[bytes]:
     return process
 
 
-def _name(function: _Function) -> str:
+def _name(function: Function) -> str:
     return f"{function.__module__}:{function.__qualname__}"
 
 

@@ -16,7 +16,7 @@ import pytest
 
 import minisim.jit
 from minisim import apart
-from minisim.jit import _digest
+from minisim.kept import digest_of
 from tests.builders import python
 
 pytestmark = pytest.mark.skipif(not minisim.jit.COMPILED, reason="numba is missing or off")
@@ -96,7 +96,7 @@ def copied(folder: Path) -> Path:
     (folder / "outside").mkdir()
     for package in ("minisim", "outside"):
         (folder / package / "__init__.py").write_text("")
-    for name in ("apart.py", "compiling.py", "jit.py"):
+    for name in ("apart.py", "compiling.py", "jit.py", "kept.py"):
         shutil.copy(source / name, folder / "minisim" / name)
     (folder / "outside" / "caller.py").write_text(CALLER)
     return folder
@@ -174,9 +174,9 @@ def test_looking_at_the_sources_is_quick() -> None:
     folder = Path(minisim.jit.__file__).parent
     times = []
     for _ in range(5):
-        _digest.cache_clear()
+        digest_of.cache_clear()
         begin = time.perf_counter()
-        _digest(folder)
+        digest_of(folder)
         times.append(time.perf_counter() - begin)
     assert min(times) < 0.02  # measured: 2 ms; importing numba takes 300
 
